@@ -1,0 +1,316 @@
+"""Scans: every format gives the same voxels, streamed or whole; every defect is named."""
+
+import os
+
+import h5py
+import numpy as np
+import pytest
+import tifffile
+from numpy.testing import assert_allclose, assert_array_equal
+
+import addvc.images.scans as scans
+from addvc.images.files import atomic_path
+from addvc.images.levels import bin_mean
+from addvc.images.scans import (
+    ScanError,
+    ScanFormat,
+    check_scans,
+    load_volume,
+    open_scan,
+    read_binned,
+    save_volume,
+)
+
+SHAPE = (34, 37, 41)  # x, y, z
+RAW = ScanFormat(shape=SHAPE[::-1], dtype="uint16")
+
+
+@pytest.fixture
+def volume():
+    """Grey values (x, y, z), uint16."""
+    return np.random.default_rng(2417).integers(100, 60000, SHAPE, dtype=np.uint16)
+
+
+@pytest.fixture
+def pages(volume):
+    """The same as pages along z, rows along y."""
+    return np.ascontiguousarray(volume.transpose(2, 1, 0))
+
+
+def write_stack(folder, pages, first=7):
+    """Single-page files numbered without leading zeros."""
+    folder.mkdir()
+    for number, page in enumerate(pages, first):
+        tifffile.imwrite(folder / f"scan_{number}.tif", page)
+
+
+def write(path, pages):
+    """Write pages (z, y, x) in the format that the name asks for."""
+    match path.name:
+        case "pages.tif":
+            with tifffile.TiffWriter(path) as tif:
+                for page in pages:
+                    tif.write(page, contiguous=False, metadata=None)
+        case "packed.tiff":
+            tifffile.imwrite(path, pages, compression="zlib")
+        case "imagej.tif":
+            tifffile.imwrite(path, pages[None, :, None], imagej=True, metadata={"axes": "TZCYX"})
+        case "big.tif":
+            tifffile.imwrite(path, pages, bigtiff=True, byteorder=">", metadata=None)
+        case "plain.TIF":
+            tifffile.imwrite(path, pages)
+        case "array.npy":
+            np.save(path, pages)
+        case "fortran.npy":
+            np.save(path, np.asfortranarray(pages))
+        case "volume.h5":
+            with h5py.File(path, "w") as file:
+                file["entry/data"] = pages
+        case "stack":
+            write_stack(path, pages)
+        case _:
+            pages.tofile(path)
+
+
+NAMES = ["pages.tif", "packed.tiff", "imagej.tif", "big.tif", "plain.TIF", "array.npy"]
+NAMES += ["fortran.npy", "volume.h5", "stack", "scan.raw", "scan.vol", "scan.bin"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_format_gives_the_same_voxels(tmp_path, volume, pages, name):
+    write(tmp_path / name, pages)
+    scan = open_scan(tmp_path / name, RAW)
+    assert (scan.shape, scan.slow_axis, scan.path) == (SHAPE, 2, tmp_path / name)
+    assert scan.dtype == np.uint16 or scan.dtype == np.dtype(">u2")
+    assert_array_equal(scan.slab(9, 12), volume[:, :, 9:12])
+    assert_array_equal(scan.slab(0, 1), volume[:, :, :1])
+    assert_array_equal(read_binned(scan), volume)
+
+
+@pytest.mark.parametrize("axes", ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"])
+def test_every_axis_order(tmp_path, volume, axes):
+    stored = volume.transpose(["xyz".index(name) for name in axes])
+    np.save(tmp_path / "scan.npy", stored)
+    scan = open_scan(tmp_path / "scan.npy", ScanFormat(axes=axes))
+    assert scan.shape == SHAPE
+    assert_array_equal(np.moveaxis(scan.slab(3, 8), scan.slow_axis, 0), stored_rows(volume, axes))
+    assert_allclose(read_binned(scan, 2), bin_mean(volume, 2))
+
+
+def stored_rows(volume, axes):
+    """Rows 3 to 8 along the axis stored first, that axis first."""
+    return np.moveaxis(volume, "xyz".index(axes[0]), 0)[3:8]
+
+
+def test_pattern_sorts_numbers_naturally(tmp_path, volume, pages):
+    write_stack(tmp_path / "stack", pages)
+    tifffile.imwrite(tmp_path / "stack" / "preview.tif", pages[0, :5])
+    assert_array_equal(read_binned(open_scan(tmp_path / "stack" / "scan_*.tif")), volume)
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+def test_raw_header_and_byte_order(tmp_path, volume, pages, order):
+    data = pages.astype(np.dtype("u2").newbyteorder("<" if order == "little" else ">")).tobytes()
+    (tmp_path / "scan.raw").write_bytes(b"x" * 513 + data)
+    fmt = ScanFormat(shape=SHAPE[::-1], dtype="uint16", byte_order=order, header_bytes=513)
+    assert_array_equal(read_binned(open_scan(tmp_path / "scan.raw", fmt)), volume)
+
+
+@pytest.mark.parametrize("factor", [1, 2])
+@pytest.mark.parametrize("axes", ["zyx", "xyz", "yxz"])
+def test_slabs_crop_and_bin_as_the_whole_does(tmp_path, monkeypatch, volume, axes, factor):
+    monkeypatch.setattr(scans, "SLAB_VOXELS", 4000)  # a few slices at a time
+    np.save(tmp_path / "scan.npy", volume.transpose(["xyz".index(name) for name in axes]))
+    scan = open_scan(tmp_path / "scan.npy", ScanFormat(axes=axes))
+    calls = []
+    crop = ((1, None), (2, -1), None)
+    found = read_binned(scan, factor, crop, lambda done, total: calls.append((done, total)))
+    assert found.dtype == np.float32
+    assert_array_equal(found, bin_mean(volume[1:, 2:-1], factor))
+    assert len(calls) > 2 and calls[-1][0] == calls[-1][1]
+
+
+def test_streaming_reads_each_slice_once(tmp_path, monkeypatch, volume, pages):
+    monkeypatch.setattr(scans, "SLAB_VOXELS", 5000)
+    np.save(tmp_path / "scan.npy", pages)
+    scan, read = open_scan(tmp_path / "scan.npy"), []
+    source = scans.Source(
+        scan.source.shape,
+        scan.source.dtype,
+        lambda start, stop: read.append((start, stop)) or pages[start:stop],
+        scan.source.files,
+    )
+    read_binned(
+        scans.Scan(scan.path, scan.shape, scan.dtype, "zyx", source), 2, (None, None, (3, 40))
+    )
+    assert [stop for _, stop in read[:-1]] == [start for start, _ in read[1:]]
+    assert (read[0][0], read[-1][1]) == (3, 39)
+
+
+def expect(message, path, fmt=None):
+    with pytest.raises(ScanError, match=message):
+        read_binned(open_scan(path, fmt))
+
+
+def test_missing_file_says_where_it_was_sought(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    expect(f"data/a.tif: no such file or folder .relative to {tmp_path}", "data/a.tif")
+    expect("an absolute path", tmp_path / "a.tif")
+    expect(r"scan_\*.tif: no TIFF file found", "scan_*.tif")
+
+
+def test_unknown_suffix_lists_the_known(tmp_path):
+    (tmp_path / "a.jpg").touch()
+    expect(r"unknown suffix '.jpg'; known are .tif, .tiff, .raw", tmp_path / "a.jpg")
+
+
+@pytest.mark.parametrize("axes", ["xyy", "xy", "XYZ", "zyxt"])
+def test_axes_must_be_a_permutation(axes):
+    expect(f"axes is '{axes}'; use a permutation of 'xyz'", "a.tif", ScanFormat(axes=axes))
+
+
+@pytest.mark.parametrize("name", ["pages.tif", "packed.tiff", "big.tif", "plain.TIF"])
+@pytest.mark.parametrize("share", [0.002, 0.1, 0.5, 0.9, 0.97, 0.995])
+def test_truncated_tiff(tmp_path, pages, name, share):
+    path = tmp_path / name
+    write(path, pages)
+    os.truncate(path, int(path.stat().st_size * share))
+    expect(f"{name}: .*truncated or damaged; copy", path)
+
+
+def test_truncated_imagej_and_others(tmp_path, pages):
+    for name in ("imagej.tif", "volume.h5", "array.npy"):
+        path = tmp_path / name
+        write(path, pages)
+        os.truncate(path, int(path.stat().st_size * 0.8))
+        expect(f"{name}: .*copy", path)
+
+
+def test_raw_size_names_both_counts_and_a_type_that_fits(tmp_path, pages):
+    path = tmp_path / "scan.raw"
+    pages.tofile(path)
+    wrong = ScanFormat(shape=SHAPE[::-1], dtype="uint8")
+    expect(
+        f"expected {pages.size} bytes .*found {pages.nbytes}; .*fit dtype uint16 or int16",
+        path,
+        wrong,
+    )
+    header = ScanFormat(shape=(40, *SHAPE[1::-1]), dtype="uint16")
+    expect(f"a header of {pages[0].nbytes} bytes would fit", path, header)
+    expect("give scans.shape .*and scans.dtype", path)
+    expect("dtype 'grey' is unknown", path, ScanFormat(shape=SHAPE, dtype="grey"))
+    expect("byte_order is 'pdp'", path, ScanFormat(shape=SHAPE, dtype="u2", byte_order="pdp"))
+    expect("give three sizes", path, ScanFormat(shape=(3, 4), dtype="u2"))
+
+
+def test_hdf5_dataset_is_chosen_or_asked_for(tmp_path, volume, pages):
+    path = tmp_path / "volume.h5"
+    with h5py.File(path, "w") as file:
+        file["a/first"], file["second"], file["angles"] = pages, pages + 1, np.arange(5)
+    expect("holds 2 three-dimensional datasets, .*a/first, second", path)
+    expect(
+        "no dataset 'a'; set scans.dataset to one of: a/first, second",
+        path,
+        ScanFormat(dataset="a"),
+    )
+    assert_array_equal(read_binned(open_scan(path, ScanFormat(dataset="second"))), volume + 1)
+
+
+def test_not_a_grey_volume(tmp_path, pages):
+    tifffile.imwrite(tmp_path / "one.tif", pages[0])
+    expect("has 2 dimensions, .*3 are needed", tmp_path / "one.tif")
+    colour = np.stack([pages] * 3, axis=-1).astype(np.uint8)
+    tifffile.imwrite(tmp_path / "rgb.tif", colour, photometric="rgb")
+    expect("colour image", tmp_path / "rgb.tif")
+    np.save(tmp_path / "complex.npy", pages.astype(complex))
+    expect("values are complex128; convert", tmp_path / "complex.npy")
+    np.save(tmp_path / "flat.npy", pages[0])
+    expect("has 2 dimensions", tmp_path / "flat.npy")
+
+
+def test_stack_with_an_odd_or_missing_slice(tmp_path, pages):
+    write_stack(tmp_path / "odd", pages)
+    tifffile.imwrite(tmp_path / "odd" / "scan_12.tif", pages[0, :5])
+    expect(r"scan_12.tif is \(5, 34\) uint16, but scan_7.tif is \(37, 34\)", tmp_path / "odd")
+    write_stack(tmp_path / "gap", pages)
+    (tmp_path / "gap" / "scan_12.tif").unlink()
+    expect("slice numbers go from 11 to 13 where others go up by 1; put", tmp_path / "gap")
+    write_stack(tmp_path / "bad", pages)
+    os.truncate(tmp_path / "bad" / "scan_30.tif", 900)
+    expect("scan_30.tif: .*truncated", tmp_path / "bad")
+
+
+def test_nan_and_inf_are_counted_and_placed(tmp_path, monkeypatch, volume):
+    monkeypatch.setattr(scans, "SLAB_VOXELS", 4000)
+    data = volume.astype(np.float32)
+    data[5, 6, 30], data[1, 2, 31], data[8, 9, 40] = np.nan, np.inf, np.nan
+    np.save(tmp_path / "scan.npy", data.transpose(2, 1, 0))
+    scan = open_scan(tmp_path / "scan.npy")
+    with pytest.raises(ScanError, match=r"3 voxels .*= \(5, 6, 30\) of the scan; crop"):
+        read_binned(scan, 2, ((1, None), None, (9, None)))
+    assert np.isfinite(read_binned(scan, 1, (None, None, (0, 30)))).all()
+
+
+def test_constant_image(tmp_path):
+    np.save(tmp_path / "scan.npy", np.full(SHAPE, 7, np.uint8))
+    expect("every voxel is 7; an image with structure is needed", tmp_path / "scan.npy")
+
+
+@pytest.mark.parametrize(
+    ("factor", "crop", "message"),
+    [
+        (3, None, r"leave \(11, 12, 13\); at least 16 are needed .*smaller bin"),
+        (1, ((0, 10), None, None), r"leave \(10, 37, 41\)"),
+        (1, ((0, 35), None, None), "crop of x is 0 to 35, but the scan has 34 voxels along x; use"),
+        (1, (None, (30, 20), None), "crop of y is 30 to 20"),
+        (0, None, "bin is 0; use a whole number"),
+        (1.5, None, "bin is 1.5; use a whole number"),
+    ],
+)
+def test_sizes_are_checked_before_reading(tmp_path, pages, factor, crop, message):
+    np.save(tmp_path / "scan.npy", pages)
+    with pytest.raises(ScanError, match=message):
+        check_scans([tmp_path / "scan.npy"], ScanFormat(), factor, crop)
+    with pytest.raises(ScanError, match=message):
+        read_binned(open_scan(tmp_path / "scan.npy"), factor, crop)
+
+
+def test_check_scans_tells_what_it_found(tmp_path, pages):
+    for name, shift in (("a.npy", 0), ("b.npy", 1)):
+        np.save(tmp_path / name, pages + np.uint16(shift))
+    first, second = check_scans([tmp_path / "a.npy", tmp_path / "b.npy"], None, 2)
+    assert first["path"] == str(tmp_path / "a.npy")
+    assert (first["shape"], first["binned_shape"]) == ([34, 37, 41], [17, 18, 20])
+    assert (first["dtype"], first["bytes"]) == ("uint16", (tmp_path / "a.npy").stat().st_size)
+    assert len(first["fingerprint"]) == 64 and first["fingerprint"] != second["fingerprint"]
+
+
+def test_check_scans_names_both_of_unequal_size(tmp_path, pages):
+    np.save(tmp_path / "a.npy", pages)
+    np.save(tmp_path / "b.npy", pages[:-1])
+    with pytest.raises(ScanError, match=r"b.npy has \(34, 37, 40\) voxels, but .*a.npy has"):
+        check_scans([tmp_path / "a.npy", tmp_path / "b.npy"], ScanFormat())
+
+
+def test_volume_round_trip(tmp_path, volume):
+    path = tmp_path / "deep" / "volume.h5"
+    save_volume(path, volume, 20.01, {"bin": 3, "state": "reference", "crop": [1, 2]})
+    found, attrs = load_volume(path)
+    assert found.dtype == np.float32
+    assert_array_equal(found, volume)
+    given = {"bin": 3, "state": "reference", "crop": [1, 2]}
+    assert attrs == {**given, "axes": "xyz", "voxel_size_um": 20.01, "unit": "um"}
+    assert [file.name for file in path.parent.iterdir()] == ["volume.h5"]
+    assert_array_equal(read_binned(open_scan(path, ScanFormat(axes="xyz"))), volume)
+
+
+def test_atomic_path_keeps_the_old_file_on_failure(tmp_path):
+    path = tmp_path / "a.json"
+    with atomic_path(path) as temporary:
+        assert (temporary.suffix, temporary.parent) == (".json", tmp_path)
+        temporary.write_text("old")
+    with pytest.raises(RuntimeError), atomic_path(path) as temporary:
+        temporary.write_text("half of the n")
+        raise RuntimeError
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a.json"]

@@ -1,0 +1,6 @@
+"""The measurement: grey-level functional, regularisation, Gauss-Newton, initialisation, transfer.
+
+May import `images`, `fem`, `geometry` and `errors`. No step reads a truth.
+Eq. 2, 3, 5: metric, gauss_newton. Eq. 6, 7: reduced_basis. Eq. 9 to 11: regularisation.
+Appendix A: transfer.
+"""

@@ -1,0 +1,125 @@
+"""Section 3.2: meso DVC, from a start found over a pyramid of binned images to the finest mesh.
+
+Two candidate starts: `zero` (u = 0, then the pyramid on the coarsest tetrahedra) and `platens` (the
+pyramid on a hexahedral grid that reaches into the platens). Either is rescaled on the coarsest
+mesh by Eq. 6, 7; the better, by sigma(r) after a short correlation, is kept.
+"""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from addvc.correlation.gauss_newton import Solution, gauss_newton
+from addvc.correlation.metric import (
+    hessian,
+    reference_on,
+    residual,
+    residual_statistics,
+    right_hand_side,
+)
+from addvc.correlation.reduced_basis import reduced_solve, scale_factors, scaling_basis
+from addvc.correlation.register import Stop, System, register
+from addvc.correlation.regularisation import diffusion
+from addvc.fem.assembly import node_pattern
+from addvc.fem.mesh import Mesh
+from addvc.fem.quadrature import Quadrature, lattice_points, voxel_points
+from addvc.fem.solver import factorise
+from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to_coarse
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class MesoOptions:
+    """Lengths in voxels: cut-off l_L of Eq. 9 (0 for none) and period T of its trial wave."""
+
+    axis: int
+    cutoff: float
+    period: float
+    stop: Stop = Stop()
+
+
+def meso_quadrature(mesh: Mesh, shape: tuple[int, int, int], lines=None) -> Quadrature:
+    """Voxel centres inside tetrahedra, or inside a grid given by its grid lines."""
+    return voxel_points(mesh, shape) if lines is None else lattice_points(lines, shape)
+
+
+def meso_system(
+    mesh: Mesh, coefficients: np.ndarray, options: MesoOptions, lines: list | None = None
+) -> System:
+    """Eq. 9 with T = L on one mesh: I_r sampled at voxel centres, and A = H + M factorised."""
+    quadrature = meso_quadrature(mesh, coefficients.shape, lines)
+    reference = reference_on(mesh, quadrature, coefficients)
+    h = hessian(reference, node_pattern(mesh))
+    if options.cutoff == 0:
+        return System(reference, None, factorise(h))
+    extra = diffusion(mesh, h, options.cutoff, options.period, options.axis)
+    return System(reference, extra, factorise(h + extra))
+
+
+def pyramid_start(
+    mesh: Mesh,
+    references: list[np.ndarray],
+    deformed: list[np.ndarray],
+    options: MesoOptions,
+    lines: list[np.ndarray] | None = None,
+) -> np.ndarray:
+    """u (n, 3) by a fold over levels, coarse to fine; level l is binned by 2**l (`levels.pyramid`).
+
+    At level l the mesh, the displacement and the lengths of the regularisation are 2**l shorter."""
+    u = np.zeros_like(mesh.points)
+    for level in reversed(range(len(references))):
+        factor = 2**level
+        small = Mesh(to_coarse(mesh.points, factor), mesh.cells)
+        grid = None if lines is None else [to_coarse(line, factor) for line in lines]
+        scaled = MesoOptions(options.axis, options.cutoff / factor, options.period / factor,
+                             options.stop)  # fmt: skip
+        system = meso_system(small, references[level], scaled, grid)
+        solution = register(system, deformed[level], displacement_to_coarse(u, factor),
+                            options.stop, f"pyramid level {level}")  # fmt: skip
+        u = displacement_to_fine(solution.u, factor)
+    return u
+
+
+def rescale(system: System, deformed: np.ndarray, w: np.ndarray, stop: Stop) -> tuple[Solution, list]:  # fmt: skip
+    """Eq. 6, 7: the start w (n, 3) scaled along x, y, z by the image alone, and the factors.
+
+    A scaling that raises sigma(r) is refused: w itself comes back, with factors of one."""
+    reference = system.reference
+    h = hessian(reference, node_pattern(reference.mesh))
+
+    def sigma(u):
+        r, inside = residual(reference, deformed, u)
+        return residual_statistics(r, inside, reference.quadrature.weight)
+
+    def downhill(u):
+        return right_hand_side(reference, residual(reference, deformed, u)[0])
+
+    solve = reduced_solve(h, scaling_basis(w))
+    solution = gauss_newton(downhill, solve, w, stop.tolerance, stop.max_iterations)
+    before, after = sigma(w), sigma(solution.u)
+    if not after["std"] <= before["std"]:
+        log.info("rescale refused: sigma(r) %.3f -> %.3f", before["std"], after["std"])
+        return Solution(w, solution.history, False, solution.seconds, before), [1.0, 1.0, 1.0]
+    factors = scale_factors(solution.u, w)
+    log.info("rescale: factors %s, sigma(r) %.3f -> %.3f", np.round(factors, 4),
+             before["std"], after["std"])  # fmt: skip
+    return Solution(solution.u, solution.history, solution.converged, solution.seconds, after), factors  # fmt: skip
+
+
+def best_start(
+    system: System, deformed: np.ndarray, candidates: dict[str, np.ndarray], iterations: int = 10
+) -> tuple[str, Solution, list[dict]]:
+    """The candidate with the least sigma(r) after `iterations` on the coarsest mesh, and the table."""
+    table, tried = [], {}
+    for name, u in candidates.items():
+        solution = register(system, deformed, u, Stop(1e-3, iterations), f"start {name}")
+        tried[name] = solution
+        table.append({"candidate": name, "residual_std": solution.residual["std"],
+                      "outside": solution.residual["outside"],
+                      "iterations": solution.iterations})  # fmt: skip
+    usable = [row for row in table if np.isfinite(row["residual_std"])]
+    best = min(usable, key=lambda row: (row["outside"] > 0.2 * len(system.reference.quadrature),
+                                        row["residual_std"]))["candidate"]  # fmt: skip
+    return best, tried[best], table

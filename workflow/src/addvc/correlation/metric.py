@@ -1,0 +1,65 @@
+"""Eq. 2, 3, 5: the grey-level functional S(u), its modified gradient and its modified Hessian."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from addvc.fem.assembly import Pattern, block_matrix, scatter_dyads, scatter_vectors
+from addvc.fem.mesh import Mesh
+from addvc.fem.quadrature import Quadrature, interpolate
+from addvc.images.spline import spline_value, spline_value_gradient
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """I_r on the quadrature of a mesh: grey levels (Q,), gradient (Q, 3) per voxel."""
+
+    mesh: Mesh
+    quadrature: Quadrature
+    grey: np.ndarray
+    gradient: np.ndarray
+
+
+def reference_on(mesh: Mesh, quadrature: Quadrature, coefficients: np.ndarray) -> Reference:
+    """Sample the spline of I_r (Eq. 4) at the points of a quadrature."""
+    grey, gradient, _ = spline_value_gradient(coefficients, quadrature.points)
+    return Reference(mesh, quadrature, grey, gradient)
+
+
+def residual(
+    reference: Reference, deformed: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eq. 5: r = I_r(x) - I_d(x + u(x)) (Q,) and inside (Q,); r = 0 where x + u has left I_d."""
+    quadrature = reference.quadrature
+    moved = interpolate(reference.mesh.cells, quadrature.cell, quadrature.shape, u)
+    moved += quadrature.points
+    grey, inside = spline_value(deformed, moved)
+    return np.where(inside, reference.grey - grey, np.float32(0)), inside
+
+
+def hessian(reference: Reference, pattern: Pattern) -> sparse.bsr_matrix:
+    """H_S of Eq. 3 (3 n, 3 n), from the gradient of I_r only: constant through the iterations."""
+    q = reference.quadrature
+    blocks = scatter_dyads(
+        pattern.slot, q.cell, q.shape, q.weight, reference.gradient, len(pattern.indices)
+    )
+    return block_matrix(pattern, blocks)
+
+
+def right_hand_side(reference: Reference, r: np.ndarray) -> np.ndarray:
+    """b = -grad S / 2 of Eq. 3 (3 n,), from residuals r (Q,)."""
+    q = reference.quadrature
+    vectors = r[:, None] * reference.gradient
+    n = len(reference.mesh.points)
+    return scatter_vectors(reference.mesh.cells, q.cell, q.shape, q.weight, vectors, n).ravel()
+
+
+def residual_statistics(r: np.ndarray, inside: np.ndarray, weight: np.ndarray) -> dict:
+    """Weighted mean and standard deviation of r where it is known, and the points dropped."""
+    kept, w = r[inside].astype(np.float64), weight[inside]
+    if len(kept) == 0:
+        return {"mean": float("nan"), "std": float("nan"), "outside": int((~inside).sum())}
+    mean = float(np.average(kept, weights=w))
+    std = float(np.sqrt(np.average((kept - mean) ** 2, weights=w)))
+    return {"mean": mean, "std": std, "outside": int((~inside).sum())}

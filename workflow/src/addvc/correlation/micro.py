@@ -1,0 +1,39 @@
+"""Section 3.3: micro DVC on the mesh of the struts. One factor of A serves every state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from addvc.correlation.metric import Reference, hessian, reference_on
+from addvc.correlation.regularisation import equilibrium_gap
+from addvc.fem.assembly import node_pattern
+from addvc.fem.mesh import Mesh
+from addvc.fem.quadrature import gauss_points
+
+
+@dataclass(frozen=True)
+class MicroOptions:
+    """Eq. 10, 11: cut-offs l_K, l_L and period T in voxels, Poisson's ratio nu, loading axis."""
+
+    axis: int
+    l_k: float
+    l_l: float
+    period: float
+    nu: float = 0.28
+    gauss: int = 4
+
+
+def micro_reference(mesh: Mesh, coefficients: np.ndarray, options: MicroOptions) -> Reference:
+    """I_r at the Gauss points of the micro mesh: the solid only, no void."""
+    return reference_on(mesh, gauss_points(mesh, options.gauss), coefficients)
+
+
+def eq10(
+    reference: Reference, penalised: np.ndarray, options: MicroOptions
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix, dict]:
+    """Eq. 10 multiplied through by S(v): A = H + M, M, and the weights c1, c2."""
+    h = hessian(reference, node_pattern(reference.mesh)).tocsr()
+    extra, weights = equilibrium_gap(reference.mesh, h, penalised, options.l_k, options.l_l,
+                                     options.period, options.nu, options.axis)  # fmt: skip
+    return h + extra, extra, weights

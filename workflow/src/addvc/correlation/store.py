@@ -1,0 +1,57 @@
+"""Solutions and factors on disk (HDF5), so that jobs can hand them to each other."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+from scipy import sparse
+
+from addvc.correlation.gauss_newton import Solution
+from addvc.fem.solver import Factor
+from addvc.images.files import atomic_path
+
+
+def save_solution(path: str | Path, solution: Solution, **notes) -> None:
+    """u (n, 3) in voxels, history, verdict; `notes` is anything JSON knows (e.g. a table)."""
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        file["u"] = solution.u
+        file["u"].attrs["unit"] = "voxel"
+        file["history"] = np.array(solution.history, dtype=float)
+        file.attrs["converged"] = solution.converged
+        file.attrs["seconds"] = solution.seconds
+        file.attrs["residual"] = json.dumps(solution.residual)
+        file.attrs["notes"] = json.dumps(notes)
+
+
+def load_solution(path: str | Path) -> tuple[Solution, dict]:
+    """A solution and its notes."""
+    with h5py.File(path) as file:
+        solution = Solution(file["u"][:], file["history"][:].tolist(),
+                            bool(file.attrs["converged"]), float(file.attrs["seconds"]),
+                            json.loads(file.attrs["residual"]))  # fmt: skip
+        return solution, json.loads(file.attrs["notes"])
+
+
+def save_factor(path: str | Path, factor: Factor, regularisation: sparse.csr_matrix, weights: dict) -> None:  # fmt: skip
+    """The factor of A = H + M with M itself, and the weights of its terms."""
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        for name, matrix in (("L", factor.lower), ("M", regularisation)):
+            group = file.create_group(name)
+            group["data"], group["indices"], group["indptr"] = (
+                matrix.data, matrix.indices, matrix.indptr)  # fmt: skip
+            group.attrs["shape"] = matrix.shape
+        file["order"] = factor.order
+        file.attrs["weights"] = json.dumps(weights)
+
+
+def load_factor(path: str | Path) -> tuple[Factor, sparse.csr_matrix, dict]:
+    """What `save_factor` wrote."""
+    with h5py.File(path) as file:
+        parts = {name: (file[name]["data"][:], file[name]["indices"][:], file[name]["indptr"][:])
+                 for name in ("L", "M")}  # fmt: skip
+        shape = tuple(file["L"].attrs["shape"])
+        lower = sparse.csc_matrix(parts["L"], shape=shape)
+        factor = Factor(lower, file["order"][:])
+        return factor, sparse.csr_matrix(parts["M"], shape=shape), json.loads(
+            file.attrs["weights"])  # fmt: skip

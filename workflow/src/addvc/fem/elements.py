@@ -1,0 +1,42 @@
+"""Elements as pure functions of the reference coordinates."""
+
+import numpy as np
+
+HEX_CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1],
+     [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float,
+)  # fmt: skip
+
+
+def tet_p1(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """xi (Q, 3) -> N (Q, 4), dN (Q, 4, 3) with dN[q, a, j] = dN_a/dxi_j; unit simplex."""
+    shape = np.column_stack([1 - xi.sum(axis=1), xi])
+    slopes = np.vstack([-np.ones(3), np.eye(3)])
+    return shape, np.broadcast_to(slopes, (len(xi), 4, 3))
+
+
+def hex_q1(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """xi (Q, 3) in [-1, 1]^3 -> N (Q, 8), dN (Q, 8, 3); VTK's order of the corners."""
+    factors = 1 + xi[:, None, :] * HEX_CORNERS  # (Q, 8, 3)
+    shape = factors.prod(axis=2) / 8
+    slopes = np.empty((len(xi), 8, 3))
+    for j in range(3):
+        slopes[:, :, j] = HEX_CORNERS[:, j] * np.delete(factors, j, axis=2).prod(axis=2) / 8
+    return shape, slopes
+
+
+def gauss_tet(points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss rule on the unit simplex, 1 (degree 1) or 4 points (degree 2): xi (Q, 3), w (Q,)."""
+    if points == 1:
+        return np.full((1, 3), 0.25), np.array([1 / 6])
+    if points == 4:
+        a, b = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
+        xi = np.full((4, 3), a)
+        xi[1:][np.eye(3, dtype=bool)] = b
+        return xi, np.full(4, 1 / 24)
+    raise ValueError(f"no tetrahedral Gauss rule with {points} points; use 1 or 4")
+
+
+def gauss_hex() -> tuple[np.ndarray, np.ndarray]:
+    """The 2 x 2 x 2 Gauss rule (degree 3) on [-1, 1]^3: xi (8, 3), w (8,)."""
+    return HEX_CORNERS / np.sqrt(3), np.ones(8)

@@ -1,0 +1,30 @@
+"""Fig. 6: a hexahedral grid with few elements in height, over the image and part of the platens."""
+
+import numpy as np
+
+from addvc.fem.mesh import Mesh
+
+
+def grid_lines(shape: tuple[int, int, int], low: float, high: float, axis: int,
+               across: int, along: int, platen: float) -> list[np.ndarray]:  # fmt: skip
+    """Grid lines: `across` cells over each width, `along` over the specimen, one in each platen.
+
+    A platen row reaches `platen` voxels into the platen, or as far as the image does; it is left
+    out where the image shows less than 4 voxels of platen."""
+    lines = [np.linspace(0.0, n - 1.0, across + 1) for n in shape]
+    inner = np.linspace(low, high, along + 1)
+    below, above = max(0.0, low - platen), min(shape[axis] - 1.0, high + platen)
+    first = [below] if low - below >= 4 else []
+    last = [above] if above - high >= 4 else []
+    lines[axis] = np.concatenate([first, inner, last])
+    return lines
+
+
+def hex_grid(lines: list[np.ndarray]) -> Mesh:
+    """Hexahedra between three sets of grid lines, numbered with the last axis fastest."""
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape([len(line) for line in lines])
+    corner = [number[i : i - 1 or None, j : j - 1 or None, k : k - 1 or None].ravel()
+              for i, j, k in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0),
+                              (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))]  # fmt: skip
+    return Mesh(points, np.column_stack(corner))

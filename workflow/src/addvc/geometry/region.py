@@ -1,0 +1,76 @@
+"""The region of micro DVC (Fig. 8), its caps, and the nodes on them (Fig. 9)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from addvc.errors import GeometryError
+from addvc.fem.mesh import Mesh, boundary_faces
+
+
+@dataclass(frozen=True)
+class Region:
+    """A slab [low, high] along `axis`, inside a circle (centre, radius) or a rectangle (bounds).
+
+    All in voxels; `cut_sides` says that the sides cut through material (a box, or a core)."""
+
+    axis: int
+    low: float
+    high: float
+    centre: tuple[float, float] | None = None
+    radius: float | None = None
+    bounds: tuple[tuple[float, float], tuple[float, float]] | None = None
+    cut_sides: bool = False
+
+
+def micro_region(specimen, setting, margin: float = 3.0) -> Region:
+    """Region of `micro.region`: "all" (up to `margin` voxels from platens or image ends), or a dict
+    {low, high, radius}, any of them left out for the whole.
+
+    Raises GeometryError when it is empty."""
+    wanted = {} if setting == "all" else dict(setting)
+    low = max(wanted.get("low", -np.inf), specimen.low + margin)
+    high = min(wanted.get("high", np.inf), specimen.high - margin)
+    if high - low < 4:
+        raise GeometryError(
+            f"micro.region keeps {high - low:.1f} voxels along the loading axis (from {low:.1f} to "
+            f"{high:.1f}; the specimen spans {specimen.low:.1f} to {specimen.high:.1f}); at least 4"
+        )
+    if specimen.kind == "box":
+        width = wanted.get("radius", np.inf)
+        bounds = []
+        for a, b in specimen.bounds:
+            half = min((b - a) / 2 - margin, width)
+            bounds.append(((a + b) / 2 - half, (a + b) / 2 + half))
+        return Region(specimen.axis, low, high, bounds=tuple(bounds), cut_sides=True)
+    radius = wanted.get("radius", specimen.radius + margin)
+    return Region(specimen.axis, low, high, tuple(specimen.centre), radius,
+                  cut_sides=radius < specimen.radius)  # fmt: skip
+
+
+def caps_depth(region: Region, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Depth (n,) of points (n, 3) below the two end caps, and below the sides; negative outside."""
+    along = points[..., region.axis]
+    ends = np.minimum(along - region.low, region.high - along)
+    across = points[..., [d for d in range(3) if d != region.axis]]
+    if region.radius is not None:
+        sides = region.radius - np.linalg.norm(across - region.centre, axis=-1)
+    else:
+        low, high = np.array(region.bounds).T
+        sides = np.minimum(across - low, high - across).min(axis=-1)
+    return ends, sides
+
+
+def penalised_nodes(mesh: Mesh, region: Region, sides: str, depth: float = 0.75) -> dict:
+    """Fig. 9: node masks (n,) of the surface: `ends`, `sides`, `free`, and `penalised` (D_L).
+
+    `sides` is "penalised" (Fig. 9c: the outer flank may touch the tube, or cuts material) or
+    "free" (Fig. 9a). A node is on a cap when it is a surface node within `depth` voxels of it; the
+    flank of an uncut cylinder is its outermost `depth` + 3 voxels (its margin)."""
+    surface = np.zeros(len(mesh.points), dtype=bool)
+    surface[np.unique(boundary_faces(mesh))] = True
+    below_ends, below_sides = caps_depth(region, mesh.points)
+    ends = surface & (below_ends < depth)
+    flank = surface & ~ends & (below_sides < (depth if region.cut_sides else depth + 3))
+    penalised = ends | flank if sides == "penalised" else ends
+    return {"ends": ends, "sides": flank, "free": surface & ~penalised, "penalised": penalised}

@@ -1,0 +1,89 @@
+"""Tetrahedra inside a surface, by pytetwild, behind one function.
+
+pytetwild (fTetWild) takes any triangle soup, so that a surface that crosses itself here and there
+does no harm. Its envelope is relative to the diagonal of the bounding box: it is given in voxels
+here. It is run on one thread: with more its result depends on their timing.
+"""
+
+import contextlib
+import logging
+import os
+import tempfile
+from dataclasses import dataclass
+
+import numpy as np
+import pytetwild
+
+from addvc.errors import MeshError
+from addvc.fem.mesh import Mesh, face_components, mean_edge_length, oriented, submesh
+from addvc.geometry.surface import Surface
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class TetOptions:
+    """`edge_length` and `envelope` in voxels; the rest as fTetWild's optimiser has it."""
+
+    edge_length: float
+    envelope: float = 0.2
+    stop_energy: float = 20.0
+    passes: int = 5
+    coarsen: bool = False
+
+
+@contextlib.contextmanager
+def scratch_folder():
+    """Run in a temporary folder: the mesher leaves files in the current one."""
+    before = os.getcwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            yield
+        finally:
+            os.chdir(before)
+
+
+def tetrahedralise(surface: Surface, options: TetOptions) -> Mesh:
+    """Tetrahedra of the inside of a surface, positively oriented.
+
+    Raises MeshError when the mesher returns nothing."""
+    diagonal = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+    with scratch_folder():
+        points, cells = pytetwild.tetrahedralize(
+            surface.points, surface.faces, edge_length_abs=options.edge_length,
+            epsilon=options.envelope / diagonal, stop_energy=options.stop_energy,
+            num_opt_iter=max(options.passes, 1), optimize=options.passes > 0, num_threads=1,
+            coarsen=options.coarsen,
+        )  # fmt: skip
+    if len(cells) == 0:
+        raise MeshError(f"the mesher found no inside in a surface of {len(surface.faces)} "
+                        "triangles; check that it is closed and wound outwards")  # fmt: skip
+    return oriented(Mesh(points, cells))
+
+
+def largest_piece(mesh: Mesh) -> tuple[Mesh, dict]:
+    """The largest face-connected component, and how many were dropped with their share of cells."""
+    label = face_components(mesh)
+    keep = label == 0
+    return submesh(mesh, keep), {"pieces": int(label.max()) + 1,
+                                 "dropped_cells": int((~keep).sum())}  # fmt: skip
+
+
+def sized(surface: Surface, size: float, attempts: int = 8, tolerance: float = 0.04) -> Mesh:
+    """A mesh whose mean edge is `size` voxels within `tolerance` (relative), by secant steps.
+
+    The best of `attempts` is kept and logged: the mesher's response is not linear."""
+    asked, best = size, None
+    for _ in range(attempts):
+        mesh = tetrahedralise(surface, TetOptions(asked, envelope=0.05 * size, passes=40,
+                                                  stop_energy=10.0, coarsen=True))  # fmt: skip
+        measured = mean_edge_length(mesh)
+        log.info("asked for edges of %.2f voxels: %d tets, mean edge %.2f", asked,
+                 len(mesh.cells), measured)  # fmt: skip
+        if best is None or abs(measured - size) < abs(best[0] - size):
+            best = measured, mesh
+        if abs(measured - size) < tolerance * size:
+            break
+        asked *= size / measured
+    return best[1]

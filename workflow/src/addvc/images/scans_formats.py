@@ -1,0 +1,178 @@
+"""How each kind of scan file is opened: its shape, its grey type and a reader of its slices.
+
+Every opener maps (path, format) to a `Source`, still in the file's own axis order, slowest first;
+`scans.open_scan` turns that into (x, y, z). Readers open their file anew for each slab, so that no
+memory map or handle outlives it.
+"""
+
+import glob
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from addvc.errors import ScanError
+
+COMMON_DTYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
+
+
+@dataclass(frozen=True)
+class ScanFormat:
+    """What a file does not say about itself.
+
+    axes: order of the axes as stored, slowest first: 'zyx' for TIFF pages along z, rows along y.
+    shape, dtype, byte_order ('little' or 'big'), header_bytes: of raw files only, the shape in the
+    file's own axis order. dataset: path inside an HDF5 file, needed when it holds several volumes.
+    """
+
+    axes: str = "zyx"
+    shape: tuple[int, int, int] | None = None
+    dtype: str | None = None
+    byte_order: str = "little"
+    header_bytes: int = 0
+    dataset: str | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """An opened scan in the file's own axis order.
+
+    read(start, stop) -> slices along the first axis, (stop - start, ...); files: what holds them.
+    """
+
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    read: Callable[[int, int], NDArray]
+    files: tuple[Path, ...]
+
+
+def is_pattern(path: Path) -> bool:
+    """Whether the name is a glob pattern such as 'scan_*.tif' rather than a file or folder."""
+    return glob.has_magic(str(path)) and not path.exists()
+
+
+def natural_key(name: str) -> list[tuple[int, int | str]]:
+    """Sort key by which 'scan_9' comes before 'scan_10'."""
+    parts = re.split(r"(\d+)", name)
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in parts if part]
+
+
+def open_raw(path: Path, fmt: ScanFormat) -> Source:
+    """A headerless array: header_bytes, then product(shape) values of `dtype`."""
+    if fmt.shape is None or fmt.dtype is None:
+        raise ScanError(
+            f"{path}: a {path.suffix} file does not say what it holds; give scans.shape (three "
+            f"sizes in the order of axes, '{fmt.axes}') and scans.dtype (such as uint16)"
+        )
+    shape, dtype = tuple(int(n) for n in fmt.shape), _raw_dtype(path, fmt)
+    if len(shape) != 3 or min(shape) < 1 or fmt.header_bytes < 0:
+        raise ScanError(
+            f"{path}: shape {fmt.shape} with header_bytes {fmt.header_bytes}; "
+            "give three sizes of at least 1 and a header of at least 0 bytes"
+        )
+    _check_raw_size(path, fmt, shape, dtype)
+    page = int(np.prod(shape[1:]))
+
+    def read(start: int, stop: int) -> NDArray:
+        offset = fmt.header_bytes + start * page * dtype.itemsize
+        values = np.fromfile(path, dtype, count=(stop - start) * page, offset=offset)
+        return values.reshape(stop - start, *shape[1:])
+
+    return Source(shape, dtype, read, (path,))
+
+
+def _raw_dtype(path: Path, fmt: ScanFormat) -> np.dtype:
+    """The grey type of a raw file, byte order included."""
+    if fmt.byte_order not in ("little", "big"):
+        raise ScanError(f"{path}: byte_order is '{fmt.byte_order}'; use 'little' or 'big'")
+    try:
+        return np.dtype(fmt.dtype).newbyteorder({"little": "<", "big": ">"}[fmt.byte_order])
+    except TypeError as error:
+        raise ScanError(
+            f"{path}: dtype '{fmt.dtype}' is unknown; use one of {', '.join(COMMON_DTYPES)}"
+        ) from error
+
+
+def _check_raw_size(path: Path, fmt: ScanFormat, shape: tuple[int, ...], dtype: np.dtype) -> None:
+    """The file must hold exactly the header and the voxels."""
+    found, voxels = path.stat().st_size, int(np.prod(shape))
+    expected = fmt.header_bytes + voxels * dtype.itemsize
+    if found == expected:
+        return
+    others = [
+        name
+        for name in COMMON_DTYPES
+        if fmt.header_bytes + voxels * np.dtype(name).itemsize == found
+    ]
+    hint = f"; the size would fit dtype {' or '.join(others)}" if others else ""
+    if not others and found > expected:
+        hint = f"; a header of {found - voxels * dtype.itemsize} bytes would fit"
+    raise ScanError(
+        f"{path}: expected {expected} bytes (header {fmt.header_bytes} + shape {shape} of "
+        f"{dtype.name}), found {found}; correct scans.shape, dtype or header_bytes, "
+        f"or copy the file again{hint}"
+    )
+
+
+def open_npy(path: Path, fmt: ScanFormat) -> Source:
+    """An array saved by numpy, memory-mapped slab by slab."""
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise ScanError(
+            f"{path}: not a readable .npy array ({error}); copy it again or save it with numpy.save"
+        ) from error
+
+    def read(start: int, stop: int) -> NDArray:
+        return np.load(path, mmap_mode="r", allow_pickle=False)[start:stop]
+
+    return Source(array.shape, array.dtype, read, (path,))
+
+
+def open_hdf5(path: Path, fmt: ScanFormat) -> Source:
+    """A dataset of an HDF5 file; `dataset` may be left out when there is one volume only."""
+    try:
+        with h5py.File(path, "r") as file:
+            name = fmt.dataset or _only_volume(path, file)
+            found = file.get(name)
+            if not isinstance(found, h5py.Dataset):
+                names = ", ".join(_volumes(file)) or "(none)"
+                raise ScanError(
+                    f"{path}: no dataset '{name}'; set scans.dataset to one of: {names}"
+                )
+            shape, dtype = found.shape, found.dtype
+    except OSError as error:
+        raise ScanError(f"{path}: not a readable HDF5 file ({error}); copy it again") from error
+
+    def read(start: int, stop: int) -> NDArray:
+        with h5py.File(path, "r") as file:
+            return file[name][start:stop]
+
+    return Source(shape, dtype, read, (path,))
+
+
+def _volumes(file: h5py.File) -> list[str]:
+    """Names of the three-dimensional datasets of an HDF5 file."""
+    names: list[str] = []
+
+    def note(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and item.ndim == 3:
+            names.append(name)
+
+    file.visititems(note)
+    return names
+
+
+def _only_volume(path: Path, file: h5py.File) -> str:
+    """The one volume of an HDF5 file."""
+    names = _volumes(file)
+    if len(names) != 1:
+        raise ScanError(
+            f"{path}: holds {len(names)} three-dimensional datasets, 1 is needed; "
+            f"set scans.dataset{' to one of: ' + ', '.join(names) if names else ''}"
+        )
+    return names[0]

@@ -1,0 +1,37 @@
+"""Volumes between the stages of the workflow: HDF5, (x, y, z), float32."""
+
+import os
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from addvc.images.files import atomic_path
+
+
+def save_volume(
+    path: str | os.PathLike, volume: NDArray, voxel_size_um: float, attrs: dict | None = None
+) -> None:
+    """Write (nx, ny, nz) as float32 dataset 'volume' of an HDF5 file, whole or not at all.
+
+    voxel_size_um: edge of a voxel of this volume. attrs: more attributes (numbers, strings, lists
+    of them), such as bin; axes, voxel_size_um and unit (of voxel_size_um) are set here.
+    """
+    given = {"bin": 1, **(attrs or {})}
+    given |= {"axes": "xyz", "voxel_size_um": float(voxel_size_um), "unit": "um"}
+    chunks = tuple(min(64, n) for n in volume.shape)
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        data = np.asarray(volume, dtype=np.float32)
+        dataset = file.create_dataset("volume", data=data, chunks=chunks)
+        dataset.attrs.update(given)
+
+
+def load_volume(path: str | os.PathLike) -> tuple[NDArray[np.float32], dict]:
+    """A volume written by save_volume: (nx, ny, nz) float32 and its attributes."""
+    with h5py.File(path, "r") as file:
+        dataset = file["volume"]
+        attrs = {
+            key: value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+            for key, value in dataset.attrs.items()
+        }
+        return dataset[...].astype(np.float32, copy=False), attrs

@@ -1,0 +1,208 @@
+"""Where the specimen is in its binned image: between which platens, inside which cylinder or box.
+
+All coordinates are voxels of the image at hand, voxel k reaching from k - 0.5 to k + 0.5. The two
+directions across the loading axis are ordered by increasing axis index.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.filters import threshold_otsu
+
+from addvc.errors import GeometryError
+from addvc.images.levels import bin_mean, to_fine
+from addvc.images.platens import find_platens
+from addvc.images.silhouette import (
+    Rectangle,
+    corners_filled,
+    fit_disc,
+    fit_rectangle,
+    likelihood,
+)
+
+__all__ = ["Specimen", "find_platens", "find_specimen", "platen_faces", "solid_threshold"]
+
+BIN = 2  # lines of solid outlast the noise better in means of 2 x 2 x 2 voxels
+MIN_ROWS = 8  # voxels between the platens
+FACE_MARGIN = 3  # rows left out at each platen: the blur of its face
+OTSU_VOXELS = 2e6  # more are thinned out
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A cylinder or box along `axis`, from `low` to `high` on it.
+
+    centre: its middle across the axis. radius: of a cylinder, else None. bounds: of a box, two
+    (low, high) pairs across the axis, else None.
+    """
+
+    kind: str
+    axis: int
+    low: float
+    high: float
+    centre: tuple[float, float]
+    radius: float | None = None
+    bounds: Rectangle | None = None
+
+    @property
+    def across(self) -> tuple[int, int]:
+        """The two axes across the loading axis."""
+        first, second = (axis for axis in range(3) if axis != self.axis)
+        return first, second
+
+    def inside(self, points: NDArray, margin: float = 0.0) -> NDArray[np.bool_]:
+        """points (n, 3) -> (n,): inside, at least `margin` from every face (negative: beyond)."""
+        along = points[:, self.axis]
+        within = (along >= self.low + margin) & (along <= self.high - margin)
+        first, second = self.across
+        return within & self._inside_across(points[:, first], points[:, second], margin)
+
+    def voxel_mask(self, shape: Sequence[int]) -> NDArray[np.bool_]:
+        """Volume (nx, ny, nz) that is True at the voxels whose centres are inside."""
+        rows = np.arange(shape[self.axis])
+        grid = np.ogrid[tuple(slice(shape[axis]) for axis in self.across)]
+        within = (rows >= self.low) & (rows <= self.high)
+        mask = np.zeros(tuple(shape), dtype=bool)
+        np.moveaxis(mask, self.axis, 0)[within] = self._inside_across(*grid, 0.0)
+        return mask
+
+    def _inside_across(self, first: NDArray, second: NDArray, margin: float) -> NDArray[np.bool_]:
+        """Coordinates across the axis, broadcast against each other -> inside."""
+        if self.kind == "cylinder":
+            distance = np.hypot(first - self.centre[0], second - self.centre[1])
+            return distance <= self.radius - margin
+        (a, b), (c, d) = self.bounds
+        inside_first = (first >= a + margin) & (first <= b - margin)
+        return inside_first & (second >= c + margin) & (second <= d - margin)
+
+    def to_dict(self) -> dict:
+        """Numbers, strings and lists only, for JSON."""
+        data = asdict(self)
+        data["centre"] = list(self.centre)
+        data["bounds"] = self.bounds and [list(pair) for pair in self.bounds]
+        return data
+
+    @classmethod
+    def from_dict(cls, data: dict) -> "Specimen":
+        """The inverse of to_dict."""
+        bounds = data["bounds"] and tuple(tuple(pair) for pair in data["bounds"])
+        return cls(**{**data, "centre": tuple(data["centre"]), "bounds": bounds})
+
+
+def find_specimen(
+    volume: NDArray,
+    axis: int,
+    platens: str | Sequence[float] = "auto",
+    specimen: str = "auto",
+    threshold: float | None = None,
+) -> Specimen:
+    """Find the specimen in an image (nx, ny, nz) loaded along `axis`.
+
+    platens: 'auto', 'none' (the ends of the image) or [low, high]. specimen: 'auto', 'cylinder' or
+    'box'; auto says box where the solid fills the corners of the image or outlines a rectangle
+    better than a disc. threshold: grey level of the solid, by default Otsu's between the platens,
+    of an image binned by two against noise. Raises GeometryError when there is no solid, or no
+    room between the platens.
+    """
+    if specimen not in ("auto", "cylinder", "box"):
+        raise GeometryError(f"specimen is '{specimen}'; use auto, cylinder or box")
+    low, high = platen_faces(volume, axis, platens)
+    factor = BIN if threshold is None else 1
+    rows = bin_mean(_rows_between(volume, axis, low, high), factor)
+    outline = _outline(rows, threshold)
+    kind = _kind(outline, len(rows)) if specimen == "auto" else specimen
+    if kind == "cylinder":
+        centre, radius = fit_disc(outline, len(rows))
+        first, second = to_fine(centre, factor).tolist()
+        return Specimen(kind, axis, low, high, (first, second), radius=radius * factor)
+    sizes = np.delete(volume.shape, axis)
+    return _box(axis, low, high, fit_rectangle(outline, len(rows)), factor, sizes)
+
+
+def _outline(rows: NDArray, threshold: float | None) -> NDArray:
+    """Counts (n1, n2) of solid voxels in rows (n, n1, n2), summed along the first axis."""
+    level = solid_threshold(rows) if threshold is None else threshold
+    counts = np.count_nonzero(rows > level, axis=0)
+    if not counts.any():
+        raise GeometryError(
+            f"no voxel between the platens exceeds the threshold {level:.6g}, the brightest is "
+            f"{rows.max():.6g}; lower the threshold, or check platens"
+        )
+    return counts
+
+
+def _box(
+    axis: int, low: float, high: float, bounds: Rectangle, factor: int, sizes: NDArray
+) -> Specimen:
+    """Box from bounds in binned voxels; a side at the end of the binned image lies at the end."""
+    pairs = []
+    for (start, stop), n in zip(bounds, sizes.tolist(), strict=True):
+        reaches = stop >= n // factor - 0.5
+        pairs.append(
+            (float(to_fine(start, factor)), n - 0.5 if reaches else float(to_fine(stop, factor)))
+        )
+    (a, b), (c, d) = pairs
+    return Specimen("box", axis, low, high, ((a + b) / 2, (c + d) / 2), bounds=((a, b), (c, d)))
+
+
+def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> tuple[float, float]:
+    """Coordinates of both platen faces, or of the ends of the image, checked."""
+    n = volume.shape[axis]
+    low, high = -0.5, n - 0.5
+    if not isinstance(platens, str):
+        low, high = _given_faces(platens, n)
+    elif platens == "auto":
+        low, high = find_platens(volume, axis) or (low, high)
+    elif platens != "none":
+        raise GeometryError(f"platens is '{platens}'; use auto, none or [LOW, HIGH]")
+    if high - low < MIN_ROWS:
+        raise GeometryError(
+            f"{high - low:.1f} rows lie between the platens ({low:.1f} to {high:.1f}), at least "
+            f"{MIN_ROWS} are needed; give platens: [LOW, HIGH] or none, or check loading_axis"
+        )
+    return low, high
+
+
+def _given_faces(platens: Sequence[float], n: int) -> tuple[float, float]:
+    """Check what the user says about the platens of an image of n rows."""
+    if len(platens) != 2:
+        raise GeometryError(f"platens is {list(platens)}; give two coordinates, [LOW, HIGH]")
+    low, high = float(platens[0]), float(platens[1])
+    if not low < high:
+        raise GeometryError(
+            f"platens [{low:g}, {high:g}] are reversed; give [LOW, HIGH], LOW first"
+        )
+    if low < -0.5 or high > n - 0.5:
+        raise GeometryError(
+            f"platens [{low:g}, {high:g}] leave the image, which reaches from -0.5 to {n - 0.5} "
+            "along the loading axis; give them in voxels of the binned image"
+        )
+    return low, high
+
+
+def _rows_between(volume: NDArray, axis: int, low: float, high: float) -> NDArray:
+    """View (rows, n1, n2) of the image between the platens, clear of the blur of real faces."""
+    n = volume.shape[axis]
+    spare = min(FACE_MARGIN, (high - low - MIN_ROWS) / 2 + 1)
+    start = 0 if low <= -0.5 else int(np.ceil(low + spare))
+    stop = n if high >= n - 0.5 else int(np.floor(high - spare)) + 1
+    return np.moveaxis(volume, axis, 0)[start:stop]
+
+
+def solid_threshold(volume: NDArray) -> float:
+    """Otsu's grey level between void and solid, of at most about two million voxels."""
+    step = int(np.ceil((volume.size / OTSU_VOXELS) ** (1 / 3)))
+    values = volume[::step, ::step, ::step]
+    darkest, brightest = np.percentile(values, (0.05, 99.95))  # hot voxels would blunt the bins
+    return float(threshold_otsu(np.clip(values, darkest, brightest)))
+
+
+def _kind(outline: NDArray, rows: int) -> str:
+    """Box or cylinder, whichever the solid seen along the axis looks like."""
+    if corners_filled(outline):
+        return "box"
+    disc = likelihood(outline, rows, fit_disc(outline, rows))
+    rectangle = likelihood(outline, rows, fit_rectangle(outline, rows))
+    return "box" if rectangle > disc else "cylinder"

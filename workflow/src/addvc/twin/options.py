@@ -1,0 +1,131 @@
+"""What a synthetic test is made of: every choice, its unit and its default."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+SIZES = {
+    "tiny": (72, 84, 72),
+    "default": (120, 140, 120),
+    "mid": (200, 240, 200),
+    "paper": (504, 551, 507),
+}
+"""Shape (nx, ny, nz) of the binned image of each size, voxels."""
+
+DTYPES = ("uint8", "uint16", "float32")
+
+PLATEN_SHARE = 0.085
+"""Share of the image's height that each platen fills in the reference."""
+
+AIR, AIR_SHARE = 7.0, 0.035
+"""Air between the specimen and the side of the image: so many voxels for the free ends that swing
+out, and this share of the width for the specimen's bulge."""
+
+
+@dataclass(frozen=True)
+class TwinOptions:
+    """Lengths are voxels of the binned image, grey levels those of an 8-bit scan.
+
+    `bin`: scans are made this many times finer than the binned image. `strains`: nominal
+    compression of each deformed state. `noise`: standard deviation per scan voxel. `psf`: Gaussian
+    sigma in scan voxels. `cupping`, `drift`: relative; `rings`: grey levels. Zero switches off.
+    `dtype`: `uint8` and `float32` hold grey levels, `uint16` 100 times them. `step`: strain
+    between two updates of the network's geometry.
+    """
+
+    size: str = "default"
+    seed: int = 2417
+    bin: int = 1
+    cell_size: float = 28.0
+    porosity: float = 0.96
+    strains: tuple[float, ...] = (0.034, 0.052, 0.123, 0.285)
+    noise: float = 4.0
+    dtype: str = "uint8"
+    elongation: float = 1.2
+    band: bool = True
+    psf: float = 0.7
+    cupping: float = 0.04
+    rings: float = 1.0
+    drift: float = 0.01
+    step: float = 0.01
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "strains", tuple(float(e) for e in self.strains))
+        for failed, message in self._faults():
+            if failed:
+                raise ValueError(message)
+
+    @classmethod
+    def from_config(cls, config: Mapping[str, Any]) -> TwinOptions:
+        """Options from the `twin` section of a config; an unknown key is an error."""
+        known = [f.name for f in fields(cls)]
+        unknown = sorted(set(config) - set(known))
+        if unknown:
+            raise ValueError(f"unknown twin keys {unknown}; the known ones are {known}")
+        return cls(**config)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape (nx, ny, nz) of the binned image."""
+        return SIZES[self.size]
+
+    def _faults(self):
+        """Pairs (is it wrong?, what to say)."""
+        e = np.array((0.0, *self.strains))
+        yield self.size not in SIZES, f"twin size {self.size!r} is none of {sorted(SIZES)}"
+        yield self.dtype not in DTYPES, f"twin dtype {self.dtype!r} is none of {DTYPES}"
+        yield self.bin < 1 or self.bin != int(self.bin), f"twin bin {self.bin} is no integer >= 1"
+        yield (
+            not 0.85 <= self.porosity < 1,
+            f"porosity {self.porosity} is outside [0.85, 1), struts would merge; try 0.9 to 0.98",
+        )
+        yield (
+            not (np.all(np.diff(e) > 0) and e[-1] <= 0.5),
+            f"strains {self.strains} must increase from above 0 to at most 0.5",
+        )
+        yield not 0 < self.step <= 0.05, f"step {self.step} is outside (0, 0.05]; 0.01 is usual"
+        for key in ("noise", "psf", "cupping", "rings", "drift"):
+            value = getattr(self, key)
+            yield value < 0, f"{key} {value} is negative; 0 switches it off"
+        size = min(SIZES.get(self.size, (1, 1, 1)))
+        yield (
+            not 8 <= self.cell_size <= size / 2,
+            f"cell_size {self.cell_size} is outside [8, {size / 2}] voxels for size {self.size!r}",
+        )
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """The cylinder of foam (axis y) and the faces of its platens, voxels of the binned image."""
+
+    shape: tuple[int, int, int]
+    low: float
+    high: float
+    radius: float
+
+    @property
+    def height(self) -> float:
+        return self.high - self.low
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(3,) middle of the image, on the axis."""
+        return (np.array(self.shape) - 1) / 2
+
+    def inside(self, points: np.ndarray) -> np.ndarray:
+        """points (..., 3) -> bool (...): within the cylinder and between the platens."""
+        x = points - self.centre
+        across = np.hypot(x[..., 0], x[..., 2]) < self.radius
+        return across & (points[..., 1] > self.low) & (points[..., 1] < self.high)
+
+
+def specimen(options: TwinOptions) -> Specimen:
+    """The specimen in the reference image; the image covers [-0.5, n - 0.5] on each axis."""
+    nx, ny, nz = options.shape
+    low = -0.5 + PLATEN_SHARE * ny
+    width = min(nx, nz)
+    return Specimen(options.shape, low, ny - 1 - low, width / 2 - AIR - AIR_SHARE * width)
