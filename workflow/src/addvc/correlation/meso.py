@@ -6,12 +6,13 @@ mesh by Eq. 6, 7; the better, by sigma(r) after a short correlation, is kept.
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from addvc.correlation.gauss_newton import Solution, gauss_newton
 from addvc.correlation.metric import (
+    Reference,
     hessian,
     reference_on,
     residual,
@@ -40,6 +41,22 @@ class MesoOptions:
     stop: Stop = Stop()
 
 
+def meso_options(section: dict, size: float, axis: int, coarsest: bool) -> MesoOptions:
+    """Options of one mesh of mean edge `size` from the `meso` section of a configuration.
+
+    The coarsest mesh is regularised by its elements alone. The paper's cut-off of some 35 voxels
+    on the others smooths more than its elements do: on the twin meso 23 then is worse than meso 33.
+    0.6 of the edge keeps the system regular and falls from mesh to mesh."""
+    cutoff = 0.6 * size if section["l_l"] == "auto" else float(section["l_l"])
+    stop = Stop(section["tolerance"], section["max_iterations"])
+    return MesoOptions(axis, 0.0 if coarsest else cutoff, 4 * size, stop)
+
+
+def start_options(section: dict, size: float, axis: int) -> MesoOptions:
+    """Options of the pyramid: a loose criterion, and a Laplacian of one element on every level."""
+    return MesoOptions(axis, size, 4 * size, Stop(1e-2, section["max_iterations"]))
+
+
 def meso_quadrature(mesh: Mesh, shape: tuple[int, int, int], lines=None) -> Quadrature:
     """Voxel centres inside tetrahedra, or inside a grid given by its grid lines."""
     return voxel_points(mesh, shape) if lines is None else lattice_points(lines, shape)
@@ -56,6 +73,11 @@ def meso_system(
         return System(reference, None, factorise(h))
     extra = diffusion(mesh, h, options.cutoff, options.period, options.axis)
     return System(reference, extra, factorise(h + extra))
+
+
+def coarse_reference(mesh: Mesh, coefficients: np.ndarray) -> Reference:
+    """I_r at the voxel centres of a tetrahedral mesh."""
+    return reference_on(mesh, meso_quadrature(mesh, coefficients.shape), coefficients)
 
 
 def pyramid_start(
@@ -82,11 +104,12 @@ def pyramid_start(
     return u
 
 
-def rescale(system: System, deformed: np.ndarray, w: np.ndarray, stop: Stop) -> tuple[Solution, list]:  # fmt: skip
+def rescale(
+    reference: Reference, deformed: np.ndarray, w: np.ndarray, stop: Stop
+) -> tuple[Solution, list[float]]:
     """Eq. 6, 7: the start w (n, 3) scaled along x, y, z by the image alone, and the factors.
 
     A scaling that raises sigma(r) is refused: w itself comes back, with factors of one."""
-    reference = system.reference
     h = hessian(reference, node_pattern(reference.mesh))
 
     def sigma(u):
@@ -101,11 +124,11 @@ def rescale(system: System, deformed: np.ndarray, w: np.ndarray, stop: Stop) -> 
     before, after = sigma(w), sigma(solution.u)
     if not after["std"] <= before["std"]:
         log.info("rescale refused: sigma(r) %.3f -> %.3f", before["std"], after["std"])
-        return Solution(w, solution.history, False, solution.seconds, before), [1.0, 1.0, 1.0]
+        return replace(solution, u=w, residual=before, converged=False), [1.0, 1.0, 1.0]
     factors = scale_factors(solution.u, w)
     log.info("rescale: factors %s, sigma(r) %.3f -> %.3f", np.round(factors, 4),
              before["std"], after["std"])  # fmt: skip
-    return Solution(solution.u, solution.history, solution.converged, solution.seconds, after), factors  # fmt: skip
+    return replace(solution, residual=after), factors
 
 
 def best_start(

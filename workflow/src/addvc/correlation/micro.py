@@ -21,12 +21,21 @@ class MicroOptions:
     l_l: float
     period: float
     nu: float = 0.28
-    gauss: int = 4
 
 
-def micro_reference(mesh: Mesh, coefficients: np.ndarray, options: MicroOptions) -> Reference:
-    """I_r at the Gauss points of the micro mesh: the solid only, no void."""
-    return reference_on(mesh, gauss_points(mesh, options.gauss), coefficients)
+def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
+    """Options from the `micro` section of a configuration; "auto" lengths are two cell sizes.
+
+    The paper takes l_K = 1.25 cell sizes, the shortest that converged. On the twin, whose lattice
+    mesh is finer, 1 / 1.4 / 2 cell sizes give median errors of .13 / .10 / .09 voxel at 3.4 %."""
+    l_k, l_l = (2 * cell_size if section[key] == "auto" else float(section[key])
+                for key in ("l_k", "l_l"))  # fmt: skip
+    return MicroOptions(axis, l_k, l_l, float(section["period"]), section["nu"])
+
+
+def micro_reference(mesh: Mesh, coefficients: np.ndarray) -> Reference:
+    """I_r at the four Gauss points of each tetrahedron: the solid only, no void."""
+    return reference_on(mesh, gauss_points(mesh), coefficients)
 
 
 def eq10(

@@ -33,6 +33,20 @@ def load_solution(path: str | Path) -> tuple[Solution, dict]:
         return solution, json.loads(file.attrs["notes"])
 
 
+def save_field(path: str | Path, u: np.ndarray, **notes) -> None:
+    """A displacement (n, 3) in voxels that is no solution of its own (a start, a transfer)."""
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        file["u"] = u
+        file["u"].attrs["unit"] = "voxel"
+        file.attrs["notes"] = json.dumps(notes)
+
+
+def load_field(path: str | Path) -> np.ndarray:
+    """u (n, 3) of a field or of a solution."""
+    with h5py.File(path) as file:
+        return file["u"][:]
+
+
 def save_factor(path: str | Path, factor: Factor, regularisation: sparse.csr_matrix, weights: dict) -> None:  # fmt: skip
     """The factor of A = H + M with M itself, and the weights of its terms."""
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:

@@ -5,50 +5,48 @@ from scipy import fft, ndimage
 
 from addvc.errors import GeometryError
 
-LARGEST_BOX = 256
+LARGEST_BOX = 200  # voxels: a larger one says nothing more, and its FFT would take gigabytes
+PLATEN_MARGIN = 3.0
 
 
 def central_box(specimen, shape: tuple[int, int, int]) -> tuple[slice, slice, slice]:
-    """The largest centred box inside the specimen (a square in a circle), at most 256 voxels wide."""
+    """The box around the specimen without its platens, its centre if over 200 voxels wide."""
     low, high = np.zeros(3), np.array(shape) - 1.0
-    across = [d for d in range(3) if d != specimen.axis]
-    low[specimen.axis], high[specimen.axis] = specimen.low + 2, specimen.high - 2
-    for n, d in enumerate(across):
-        if specimen.kind == "cylinder":
-            half = specimen.radius / np.sqrt(2)
-            low[d], high[d] = specimen.centre[n] - half, specimen.centre[n] + half
-        else:
-            low[d], high[d] = specimen.bounds[n]
+    low[specimen.axis] = specimen.low + PLATEN_MARGIN
+    high[specimen.axis] = specimen.high - PLATEN_MARGIN
+    for n, d in enumerate(specimen.across):
+        half = specimen.radius
+        centre = specimen.centre[n]
+        outline = (centre - half, centre + half) if half else specimen.bounds[n]
+        low[d], high[d] = outline
     excess = np.maximum(high - low - LARGEST_BOX, 0) / 2
-    low = np.maximum(np.ceil(low + excess), 0).astype(int)
+    low = np.clip(np.ceil(low + excess), 0, None).astype(int)
     high = np.minimum(np.floor(high - excess), np.array(shape) - 1).astype(int)
     return tuple(slice(a, b + 1) for a, b in zip(low, high, strict=True))
 
 
-def autocorrelation(box: np.ndarray) -> np.ndarray:
-    """Normalised autocorrelation (nx, ny, nz) of a box for shifts 0 .. n-1, without wrap-around.
+def autocorrelation(grey: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Normalised autocorrelation of a box (nx, ny, nz) inside a mask, for shifts 0 .. n-1.
 
-    Each shift is divided by the number of voxel pairs that have it; the value at zero is 1."""
-    grey = box.astype(np.float32) - box.mean(dtype=np.float64).astype(np.float32)
-    size = [fft.next_fast_len(2 * n) for n in box.shape]
-    power = np.abs(fft.rfftn(grey, size)) ** 2
-    full = fft.irfftn(power, size)
-    # shifts of either sign along y and z: fold them onto positive ones by averaging
-    n = box.shape
-    folded = full[: n[0], : n[1], : n[2]].copy()
-    pairs = [(n[d] - np.arange(n[d])).astype(np.float32) for d in range(3)]
-    folded /= pairs[0][:, None, None] * pairs[1][:, None] * pairs[2]
-    return folded / folded[0, 0, 0]
+    Each shift is divided by the number of voxel pairs that have it (nan for none); one at zero."""
+    size = [fft.next_fast_len(2 * n) for n in grey.shape]
+    centred = np.where(mask, grey - grey[mask].mean(dtype=np.float64), 0).astype(np.float32)
+    sums = [fft.irfftn(np.abs(fft.rfftn(part, size)) ** 2, size)[tuple(map(slice, grey.shape))]
+            for part in (centred, mask.astype(np.float32))]  # fmt: skip
+    pairs = np.where(sums[1] > 0.5, sums[1], np.nan)
+    value = sums[0] / pairs
+    return value / value[0, 0, 0]
 
 
-def radial_average(correlation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Radii r (voxels, one a voxel, up to half of the smallest side) and the mean around them."""
-    reach = min(correlation.shape) // 2
+def radial_average(correlation: np.ndarray, share: float = 0.6) -> tuple[np.ndarray, np.ndarray]:
+    """Radii (voxels, one a voxel, up to `share` of the smallest side) and the mean around them."""
+    reach = int(share * min(correlation.shape))
     part = correlation[:reach, :reach, :reach]
     grid = np.arange(reach, dtype=np.float32) ** 2
-    radius = np.rint(np.sqrt(grid[:, None, None] + grid[:, None] + grid)).astype(int).ravel()
-    total = np.bincount(radius, weights=part.ravel())[:reach]
-    return np.arange(reach), total / np.bincount(radius)[:reach]
+    radius = np.rint(np.sqrt(grid[:, None, None] + grid[:, None] + grid)).astype(int)
+    known = np.isfinite(part)
+    total = np.bincount(radius[known], weights=part[known])[:reach]
+    return np.arange(reach), total / np.bincount(radius[known])[:reach]
 
 
 def secondary_peak(radius: np.ndarray, curve: np.ndarray) -> float:
@@ -68,3 +66,16 @@ def secondary_peak(radius: np.ndarray, curve: np.ndarray) -> float:
     top = peaks[np.argmax(smooth[peaks])]
     before, at, after = smooth[top - 1 : top + 2]
     return float(radius[top] + 0.5 * (before - after) / (before - 2 * at + after))
+
+
+def measure_cell_size(volume: np.ndarray, specimen, setting: str | float) -> dict:
+    """The cell size in voxels ("auto": measured; a number: given) and the curve of Fig. 4.
+
+    Raises GeometryError when it must be measured and there is no secondary peak."""
+    box = central_box(specimen, volume.shape)
+    mask = specimen.voxel_mask(volume.shape)[box]
+    radius, curve = radial_average(autocorrelation(volume[box], mask))
+    size = secondary_peak(radius, curve) if setting == "auto" else float(setting)
+    source = "measured" if setting == "auto" else "config"
+    return {"cell_size": size, "source": source, "radius": radius, "correlation": curve,
+            "unit": "voxel"}  # fmt: skip

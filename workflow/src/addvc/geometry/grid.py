@@ -5,18 +5,22 @@ import numpy as np
 from addvc.fem.mesh import Mesh
 
 
-def grid_lines(shape: tuple[int, int, int], low: float, high: float, axis: int,
-               across: int, along: int, platen: float) -> list[np.ndarray]:  # fmt: skip
+def grid_lines(
+    shape: tuple[int, int, int], specimen, across: int, along: int, platen: float
+) -> list[np.ndarray]:
     """Grid lines: `across` cells over each width, `along` over the specimen, one in each platen.
 
-    A platen row reaches `platen` voxels into the platen, or as far as the image does; it is left
+    A row of cells reaches `platen` voxels into a platen, or as far as the image does; it is left
     out where the image shows less than 4 voxels of platen."""
+    last = shape[specimen.axis] - 1.0
+    low, high = max(specimen.low, 0.0), min(specimen.high, last)
     lines = [np.linspace(0.0, n - 1.0, across + 1) for n in shape]
-    inner = np.linspace(low, high, along + 1)
-    below, above = max(0.0, low - platen), min(shape[axis] - 1.0, high + platen)
-    first = [below] if low - below >= 4 else []
-    last = [above] if above - high >= 4 else []
-    lines[axis] = np.concatenate([first, inner, last])
+    below, above = max(0.0, low - platen), min(last, high + platen)
+    lines[specimen.axis] = np.concatenate([
+        [below] if low - below >= 4 else [],
+        np.linspace(low, high, along + 1),
+        [above] if above - high >= 4 else [],
+    ])  # fmt: skip
     return lines
 
 

@@ -61,8 +61,11 @@ def caps_depth(region: Region, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return ends, sides
 
 
-def penalised_nodes(mesh: Mesh, region: Region, sides: str, depth: float = 0.75) -> dict:
-    """Fig. 9: node masks (n,) of the surface: `ends`, `sides`, `free`, and `penalised` (D_L).
+FREE, ENDS, SIDES = 0, 1, 2
+
+
+def node_classes(mesh: Mesh, region: Region, sides: str, depth: float = 0.75) -> dict:
+    """Fig. 9: for each node (n,) uint8 `surface` FREE, ENDS or SIDES, and `penalised` (D_L).
 
     `sides` is "penalised" (Fig. 9c: the outer flank may touch the tube, or cuts material) or
     "free" (Fig. 9a). A node is on a cap when it is a surface node within `depth` voxels of it; the
@@ -72,5 +75,6 @@ def penalised_nodes(mesh: Mesh, region: Region, sides: str, depth: float = 0.75)
     below_ends, below_sides = caps_depth(region, mesh.points)
     ends = surface & (below_ends < depth)
     flank = surface & ~ends & (below_sides < (depth if region.cut_sides else depth + 3))
-    penalised = ends | flank if sides == "penalised" else ends
-    return {"ends": ends, "sides": flank, "free": surface & ~penalised, "penalised": penalised}
+    classes = np.select([ends, flank], [ENDS, SIDES], FREE).astype(np.uint8)
+    kept = np.where((classes == SIDES) & (sides == "free"), FREE, classes).astype(np.uint8)
+    return {"surface": classes, "penalised": kept}

@@ -6,6 +6,7 @@ cylinder, with no staircase of voxels. Slivers are avoided at the source: a vert
 cubes is kept between 0.2 and 0.8 of its voxel edge.
 """
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from skimage import measure
 
 from addvc.errors import GeometryError
 from addvc.geometry.region import Region, caps_depth
+
+log = logging.getLogger(__name__)
 
 CLAMP = 0.2
 CAP_SLOPE = 0.5  # of the contrast between solid and threshold, per voxel
@@ -52,6 +55,26 @@ def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]
     kept = np.where((label == 0) | (label == largest), grey, np.float32(gamma - 1e-3))
     return kept, {"components": int(count), "kept_fraction": float(size.max() / size.sum()),
                   "dropped_voxels": int(size.sum() - size.max())}  # fmt: skip
+
+
+def region_solid(
+    smooth: np.ndarray, levels: dict, region: Region, min_kept: float
+) -> tuple[np.ndarray, dict]:
+    """Grey levels of the region's largest solid, all else below gamma; `levels`: `find_threshold`.
+
+    Warns when over 10 % of the solid falls out; GeometryError when less than `min_kept` stays."""
+    gamma, contrast = levels["threshold"], levels["solid"] - levels["void"]
+    grey, figures = largest_component(capped(smooth, gamma, region, contrast), gamma)
+    kept = figures["kept_fraction"]
+    advice = "lower geometry.threshold or porosity, or lower images.blur"
+    if kept < min_kept:
+        raise GeometryError(f"the largest of {figures['components']} pieces holds {kept:.1%} of the "
+                            f"solid (at least {min_kept:.0%}, mesh.min_kept): struts are broken; "
+                            f"{advice}")  # fmt: skip
+    if kept < 0.9:
+        log.warning("WARNING: %.0f %% of the solid is in smaller pieces and falls out; %s",
+                    100 * (1 - kept), advice)  # fmt: skip
+    return grey, figures
 
 
 def marching_cubes(grey: np.ndarray, gamma: float) -> Surface:

@@ -5,6 +5,8 @@ outline) whose blurred grey level is below gamma. The marching-cubes volume is s
 than that of the voxels for struts two voxels thick: the count of voxels is what is matched.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from addvc.errors import GeometryError
@@ -40,6 +42,10 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
 
     The noise is 1.48 times the median absolute deviation of what is below gamma."""
     void, solid = grey[grey < gamma], grey[grey >= gamma]
+    if len(void) == 0 or len(solid) == 0:
+        raise GeometryError(f"the threshold {gamma:.1f} leaves no {'solid' if len(void) else 'void'}: "
+                            f"grey levels of the specimen go from {grey.min():.1f} to "
+                            f"{grey.max():.1f}; change geometry.threshold")  # fmt: skip
     level = float(np.median(void))
     noise = 1.4826 * float(np.median(np.abs(void - level)))
     if gamma < level + 2 * noise:
@@ -49,3 +55,19 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
             "raise porosity, or give geometry.threshold"
         )
     return {"void": level, "solid": float(np.median(solid)), "noise": noise}
+
+
+def specimen_grey(smooth: np.ndarray, specimen, margin: float = 3.0) -> np.ndarray:
+    """Grey levels (n,) inside the specimen, `margin` voxels off the platens (their blurred faces)."""
+    inner = replace(specimen, low=specimen.low + margin, high=specimen.high - margin)
+    return smooth[inner.voxel_mask(smooth.shape)]
+
+
+def find_threshold(smooth: np.ndarray, specimen, porosity: float, setting: str | float) -> dict:
+    """gamma ("auto": by bisection; a number: given), what it gives, and the levels around it."""
+    grey = specimen_grey(smooth, specimen)
+    if len(grey) == 0:
+        raise GeometryError(f"the specimen holds no voxel ({specimen}); check scans.platens")
+    gamma, trials = bisect_threshold(grey, porosity) if setting == "auto" else (setting, [])
+    return {"threshold": float(gamma), "porosity": float(np.mean(grey < gamma)),
+            "target": porosity, "trials": trials} | check_contrast(grey, gamma)  # fmt: skip

@@ -39,8 +39,8 @@ class Network:
 
 
 def area_profile(xi: np.ndarray) -> np.ndarray:
-    """Area over that at mid-span, xi in [-1/2, 1/2] along the strut [after Gong2005]: 1 to 3."""
-    return 1 + 3 * xi**2 + 20 * xi**4
+    """Area over that at mid-span, xi in [-1/2, 1/2] along the strut [after Gong2005]: 1 to 2.25."""
+    return 1 + 2 * xi**2 + 12 * xi**4
 
 
 def roughness(s: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -1,0 +1,117 @@
+"""Small meshes, textures and images that several tests share; lengths in voxels."""
+
+import numba
+import numpy as np
+import pytest
+import pyvista as pv
+from scipy import ndimage
+
+from addvc import twin
+from addvc.fem.mesh import Mesh, boundary_faces, oriented
+from addvc.twin.frame import at_rest
+
+SEED = 2417
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(SEED)
+
+
+@pytest.fixture(scope="session")
+def box():
+    """box(low, high, counts, shake): tetrahedra of a box; `shake` moves inner nodes (of a cell)."""
+
+    def make(low, high, counts, shake=0.0):
+        lines = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
+        grid = pv.RectilinearGrid(*lines).to_tetrahedra(5)
+        mesh = oriented(Mesh(np.asarray(grid.points), grid.cells_dict[pv.CellType.TETRA]))
+        points = mesh.points.copy()
+        inner = np.setdiff1d(np.arange(len(points)), boundary_faces(mesh))
+        side = (np.asarray(high, dtype=float) - low) / counts
+        rng = np.random.default_rng(SEED)
+        points[inner] += shake * side * rng.uniform(-1, 1, (len(inner), 3))
+        return Mesh(points, mesh.cells)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def rigid_motions():
+    """rigid_motions(points): the three translations and three rotations, (3 n, 6)."""
+
+    def make(points):
+        modes = [np.broadcast_to(axis, points.shape) for axis in np.eye(3)]
+        modes += [np.cross(axis, points - points.mean(axis=0)) for axis in np.eye(3)]
+        return np.column_stack([mode.ravel() for mode in modes])
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def speckle():
+    """speckle(shape, length): periodic random grey levels whose autocorrelation is 1/e at `length`."""
+
+    def make(shape, length=4.0):
+        noise = np.random.default_rng(SEED).standard_normal(shape)
+        smooth = ndimage.gaussian_filter(noise, length / 2, mode="wrap")
+        return (110 + 40 * smooth / smooth.std()).astype(np.float32)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def waves():
+    """waves(points, shortest): grey levels (n,) of plane waves, known exactly at any points (n, 3)."""
+
+    def make(points, shortest=8.0, count=60):
+        rng = np.random.default_rng(SEED)
+        direction = rng.standard_normal((count, 3))
+        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        length = shortest * rng.uniform(1, 3, count)
+        phase = rng.uniform(0, 2 * np.pi, count)
+        grey = np.zeros(len(points))
+        for way, period, start in zip(direction, length, phase, strict=True):
+            grey += np.cos(points @ (2 * np.pi / period * way) + start)
+        return 110 + 40 * grey / np.sqrt(count / 2)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def stretched(waves):
+    """stretched(shape, slope, centre, shortest): I_r and I_d of u = slope (x - centre), exactly."""
+
+    def make(shape, slope, centre, shortest=8.0):
+        voxels = np.indices(shape).reshape(3, -1).T.astype(float)
+        source = (voxels - centre) @ np.linalg.inv(np.eye(3) + slope).T + centre
+        images = (waves(points, shortest).reshape(shape) for points in (voxels, source))
+        return [image.astype(np.float32) for image in images]
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def foam():
+    """Image (72, 84, 72) of a small foam between platens, without noise, and its specimen."""
+    options = twin.TwinOptions(
+        size="tiny", seed=SEED, noise=0, cupping=0, rings=0, drift=0, dtype="float32"
+    )
+    network = twin.make_foam(options)
+    return twin.image(network, at_rest(network), options, 0), twin.specimen(options)
+
+
+@pytest.fixture
+def with_one_and_two_threads():
+    """with_one_and_two_threads(call): its two results; the number of threads is put back."""
+    before = numba.get_num_threads()
+
+    def run(call):
+        results = []
+        for threads in (1, 2):
+            numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+            results.append(call())
+        return results
+
+    yield run
+    numba.set_num_threads(before)

@@ -1,0 +1,100 @@
+"""The grey level between voxels: what the cubic B-spline must keep, and its derivative."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from addvc.images.spline import (
+    gaussian_blur,
+    interpolating_coefficients,
+    spline_value,
+    spline_value_gradient,
+)
+
+SHAPE = (14, 15, 16)
+
+
+def voxels(shape=SHAPE):
+    """Voxel centres (n, 3)."""
+    return np.indices(shape).reshape(3, -1).T.astype(float)
+
+
+def points(count=400, margin=0.0):
+    """Random points at least `margin` voxels off the outermost voxel centres."""
+    return np.random.default_rng(2417).uniform(margin, np.array(SHAPE) - 1 - margin, (count, 3))
+
+
+@pytest.fixture
+def noise():
+    return np.random.default_rng(6113).standard_normal(SHAPE).astype(np.float32)
+
+
+def test_constant_is_kept_up_to_the_border():
+    value, gradient, inside = spline_value_gradient(np.full(SHAPE, 7.0, np.float32), points())
+    assert inside.all()
+    assert_allclose(value, 7, rtol=1e-6)
+    assert_allclose(gradient, 0, atol=1e-5)
+
+
+def test_affine_grey_is_kept_off_the_border():
+    slope = np.array([1.5, -0.25, 0.75])
+    volume = (voxels() @ slope + 3).reshape(SHAPE).astype(np.float32)
+    x = points(margin=1)
+    value, gradient, _ = spline_value_gradient(volume, x)
+    assert_allclose(value, x @ slope + 3, atol=1e-5)
+    assert_allclose(gradient, np.broadcast_to(slope, x.shape), atol=1e-5)
+
+
+def test_voxels_as_coefficients_smooth_by_a_variance_of_a_third():
+    """Eq. 4 without prefilter: sum_k k^2 B3(x - k) = x^2 + 1/3."""
+    volume = (voxels()[:, 1] ** 2).reshape(SHAPE).astype(np.float32)
+    x = points(margin=1)
+    assert_allclose(spline_value(volume, x)[0], x[:, 1] ** 2 + 1 / 3, atol=1e-4)
+
+
+def test_interpolating_coefficients_pass_through_the_voxels(noise):
+    inner = voxels()[np.all((voxels() >= 1) & (voxels() <= np.array(SHAPE) - 2), axis=1)]
+    value, _ = spline_value(interpolating_coefficients(noise), inner)
+    assert_allclose(value, noise[tuple(inner.astype(int).T)], atol=1e-5)
+
+
+def test_gradient_is_the_derivative_of_the_value(noise):
+    """|I(x + t h) - I(x) - t g.h| falls with slope 2."""
+    x = points(margin=2)
+    way = np.random.default_rng(6113).uniform(-1, 1, x.shape)
+    value, gradient, _ = spline_value_gradient(noise, x)
+    steps, errors = np.array([0.2, 0.1, 0.05]), []
+    for t in steps:
+        ahead = spline_value(noise, x + t * way)[0].astype(float)
+        errors.append(np.abs(ahead - value - t * np.sum(gradient * way, axis=1)).mean())
+    assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(steps)), 2, atol=0.1)
+
+
+def test_both_kernels_give_the_same_value(noise):
+    assert_array_equal(spline_value(noise, points())[0], spline_value_gradient(noise, points())[0])
+
+
+def test_outside_begins_beyond_the_outermost_voxel_centres(noise):
+    last = np.array(SHAPE) - 1.0
+    x = np.array([[0, 0, 0], last, [-1e-9, 5, 5], last + [0, 1e-9, 0], [np.nan, 5, 5]])
+    value, gradient, inside = spline_value_gradient(noise, x)
+    assert_array_equal(inside, [True, True, False, False, False])
+    assert_array_equal(spline_value(noise, x)[1], inside)
+    assert_array_equal(value[~inside], 0)
+    assert_array_equal(gradient[~inside], 0)
+
+
+def test_blur_of_an_impulse_has_its_variance_and_keeps_its_sum():
+    volume = np.zeros((31, 31, 31), np.float32)
+    volume[15, 15, 15] = 1
+    blurred = gaussian_blur(volume, 0.8)
+    assert blurred.sum() == pytest.approx(1, abs=1e-5)
+    spread = (voxels(volume.shape) - 15) ** 2
+    assert_allclose(blurred.ravel() @ spread, 0.8**2, rtol=0.01)
+    assert_array_equal(gaussian_blur(volume, 0), volume)
+
+
+def test_number_of_threads_changes_nothing(noise, with_one_and_two_threads):
+    results = with_one_and_two_threads(lambda: spline_value_gradient(noise, points(5000)))
+    for one, two in zip(*results, strict=True):
+        assert_array_equal(one, two)

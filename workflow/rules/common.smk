@@ -1,0 +1,92 @@
+import sys
+from pathlib import Path
+
+import yaml
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import validate
+
+WORKFLOW = Path(str(workflow.current_basedir)).parent
+sys.path.insert(0, str(WORKFLOW / "src"))
+
+from addvc import config as settings
+from addvc.errors import ConfigError
+from addvc.provenance import code_hash
+
+SCHEMA = WORKFLOW / "schemas/config.schema.yaml"
+
+
+def checked_config(config):
+    """The configuration with its defaults; WorkflowError says which key is wrong, and the remedy."""
+    try:
+        settings.check_keys(config, yaml.safe_load(SCHEMA.read_text()))
+        if settings.case_kind(config) == "twin":
+            config.setdefault("twin", {})
+        validate(config, str(SCHEMA))
+        settings.meso_names(config)
+        paths = (
+            [config["scans"]["reference"], *config["scans"]["states"]]
+            if "scans" in config
+            else []
+        )
+        return [settings.scan_files(path) for path in paths]
+    except ConfigError as error:
+        raise WorkflowError(
+            f"Configuration of case {config.get('case')}: {error}"
+        ) from error
+
+
+SCAN_FILES = checked_config(config)
+CASE = config["case"]
+KIND = settings.case_kind(config)
+R = f"results/{CASE}"
+AXIS = settings.loading_axis(config)
+LABELS = settings.state_labels(config)
+STATES = list(LABELS)
+MESO = settings.meso_names(config)
+FINEST = MESO[-1]
+MICRO = list(settings.micro_names(config))
+HAS_TRUTH = KIND != "scans"
+TRUTH = {"twin": f"{R}/truth/twin.h5", "virtual": f"{R}/truth/virtual.json"}.get(KIND)
+ENV = "../../envs/addvc.yaml"
+
+
+wildcard_constraints:
+    state=r"\d+",
+    mesh="|".join(MESO + MICRO),
+    meso="|".join(MESO),
+    micro="|".join(MICRO),
+    candidate="zero|platens",
+
+
+def code(script):
+    """Hash of a script of workflow/scripts and of the modules that it uses."""
+    return code_hash(WORKFLOW / "scripts" / script)
+
+
+def section(name, *keys):
+    """The keys of a section of the configuration that a rule reads, so that a change reruns it."""
+    return {key: config[name][key] for key in keys if key in config[name]}
+
+
+def memory(least, per_input=3.0):
+    """Megabytes: `least`, or `per_input` times the size of the inputs; more at each attempt."""
+    return lambda wildcards, input, attempt: int(
+        attempt * max(least, 600, per_input * input.size_mb)
+    )
+
+
+def own_scan(state):
+    """Whether the scan of a state is made by the workflow."""
+    return KIND == "twin" or (KIND == "virtual" and state > 0)
+
+
+def scan_path(state):
+    """The path of a scan as the configuration has it: a file, a folder or a pattern."""
+    if own_scan(state):
+        return f"{R}/scans/state{state}.tif"
+    return [config["scans"]["reference"], *config["scans"]["states"]][state]
+
+
+def scan_input(state):
+    """The files of a scan."""
+    return [scan_path(state)] if own_scan(state) else SCAN_FILES[state]

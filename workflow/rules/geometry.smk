@@ -1,0 +1,192 @@
+# Cell size, threshold, surface and meshes: Fig. 4 to 9.
+
+
+rule cell_size:
+    input:
+        volume=R + "/volumes/volume0.h5",
+        specimen=R + "/geometry/specimen.json",
+    output:
+        R + "/geometry/cell_size.json",
+    log:
+        f"{R}/logs/cell_size/all.log",
+    benchmark:
+        R + "/benchmarks/cell_size/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 6.0),
+        runtime=10,
+    params:
+        code=code("geometry/cell_size.py"),
+        geometry=config["geometry"],
+    script:
+        "../scripts/geometry/cell_size.py"
+
+
+rule threshold:
+    input:
+        smooth=R + "/volumes/smooth0.h5",
+        specimen=R + "/geometry/specimen.json",
+    output:
+        R + "/geometry/threshold.json",
+    log:
+        f"{R}/logs/threshold/all.log",
+    benchmark:
+        R + "/benchmarks/threshold/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 4.0),
+        runtime=10,
+    params:
+        code=code("geometry/threshold.py"),
+        geometry=config["geometry"],
+        porosity=config["porosity"],
+    script:
+        "../scripts/geometry/threshold.py"
+
+
+rule solid:
+    input:
+        smooth=R + "/volumes/smooth0.h5",
+        specimen=R + "/geometry/specimen.json",
+        threshold=R + "/geometry/threshold.json",
+    output:
+        solid=R + "/geometry/solid.h5",
+        region=R + "/geometry/region.json",
+    log:
+        f"{R}/logs/solid/all.log",
+    benchmark:
+        R + "/benchmarks/solid/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 5.0),
+        runtime=10,
+    params:
+        code=code("geometry/solid.py"),
+        micro=section("micro", "region"),
+        mesh=section("mesh", "min_kept"),
+    script:
+        "../scripts/geometry/solid.py"
+
+
+rule surface:
+    input:
+        solid=R + "/geometry/solid.h5",
+        threshold=R + "/geometry/threshold.json",
+    output:
+        R + "/geometry/surface.vtu",
+    log:
+        f"{R}/logs/surface/all.log",
+    benchmark:
+        R + "/benchmarks/surface/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1200, 6.0),
+        runtime=10,
+    params:
+        code=code("geometry/surface.py"),
+    script:
+        "../scripts/geometry/surface.py"
+
+
+rule micro_mesh:
+    input:
+        solid=R + "/geometry/solid.h5",
+        surface=R + "/geometry/surface.vtu",
+        threshold=R + "/geometry/threshold.json",
+    output:
+        mesh=R + "/geometry/micro_mesh.vtu",
+        figures=R + "/geometry/micro.json",
+    log:
+        f"{R}/logs/micro_mesh/all.log",
+    benchmark:
+        R + "/benchmarks/micro_mesh/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(3000, 20.0),
+        runtime=120,
+    params:
+        code=code("geometry/micro_mesh.py"),
+        mesh=config["mesh"],
+    script:
+        "../scripts/geometry/micro_mesh.py"
+
+
+rule penalised_nodes:
+    input:
+        mesh=R + "/geometry/micro_mesh.vtu",
+        region=R + "/geometry/region.json",
+    output:
+        R + "/geometry/micro.vtu",
+    log:
+        f"{R}/logs/penalised_nodes/all.log",
+    benchmark:
+        R + "/benchmarks/penalised_nodes/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1200, 30.0),
+        runtime=10,
+    params:
+        code=code("geometry/penalised_nodes.py"),
+        micro=section("micro", "sides"),
+    script:
+        "../scripts/geometry/penalised_nodes.py"
+
+
+rule meso_mesh:
+    input:
+        specimen=R + "/geometry/specimen.json",
+        cell_size=R + "/geometry/cell_size.json",
+    output:
+        mesh=R + "/geometry/{meso}.vtu",
+        figures=R + "/geometry/{meso}.json",
+    log:
+        R + "/logs/meso_mesh/{meso}.log",
+    benchmark:
+        R + "/benchmarks/meso_mesh/{meso}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 3.0),
+        runtime=60,
+    params:
+        code=code("geometry/meso_mesh.py"),
+        meso=section("meso", "sizes"),
+    script:
+        "../scripts/geometry/meso_mesh.py"
+
+
+rule platen_grid:
+    input:
+        volume=R + "/volumes/volume0.h5",
+        specimen=R + "/geometry/specimen.json",
+    output:
+        mesh=R + "/geometry/grid.vtu",
+        lines=R + "/geometry/grid.json",
+    log:
+        f"{R}/logs/platen_grid/all.log",
+    benchmark:
+        R + "/benchmarks/platen_grid/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 3.0),
+        runtime=10,
+    params:
+        code=code("geometry/platen_grid.py"),
+        grid=config["grid"],
+    script:
+        "../scripts/geometry/platen_grid.py"

@@ -1,0 +1,99 @@
+# Micro DVC: section 3.3, Eq. 10, 11, appendix A.
+
+
+rule transfer:
+    input:
+        mesh=R + "/geometry/{meso}.vtu",
+        micro=R + "/geometry/micro.vtu",
+        solution=R + "/dvc/{meso}_state{state}.h5",
+    output:
+        R + "/dvc/{meso}_on_micro_state{state}.h5",
+    log:
+        R + "/logs/transfer/{meso}_state{state}.log",
+    benchmark:
+        R + "/benchmarks/transfer/{meso}_state{state}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1000, 20.0),
+        runtime=10,
+    params:
+        code=code("micro/transfer.py"),
+    script:
+        "../scripts/micro/transfer.py"
+
+
+rule factor:
+    input:
+        mesh=R + "/geometry/micro.vtu",
+        reference=R + "/volumes/smooth0.h5",
+        cell_size=R + "/geometry/cell_size.json",
+    output:
+        R + "/dvc/{micro}_factor.h5",
+    log:
+        R + "/logs/factor/{micro}.log",
+    benchmark:
+        R + "/benchmarks/factor/{micro}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(4000, 100.0),
+        runtime=120,
+    params:
+        code=code("micro/factor.py"),
+        micro=section("micro", "l_k", "l_l", "period", "nu"),
+        axis=AXIS,
+    script:
+        "../scripts/micro/factor.py"
+
+
+rule micro_dvc:
+    input:
+        mesh=R + "/geometry/micro.vtu",
+        reference=R + "/volumes/smooth0.h5",
+        deformed=R + "/volumes/smooth{state}.h5",
+        factor=R + "/dvc/{micro}_factor.h5",
+        start=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
+    output:
+        R + "/dvc/{micro}_state{state}.h5",
+    log:
+        R + "/logs/micro_dvc/{micro}_state{state}.log",
+    benchmark:
+        R + "/benchmarks/micro_dvc/{micro}_state{state}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 3.0),
+        runtime=120,
+    params:
+        code=code("micro/micro_dvc.py"),
+        micro=section("micro", "tolerance", "max_iterations"),
+    script:
+        "../scripts/micro/micro_dvc.py"
+
+
+rule micro_ultimate_error:
+    input:
+        mesh=R + "/geometry/micro.vtu",
+        reference=R + "/volumes/smooth0.h5",
+        factor=R + "/dvc/{micro}_factor.h5",
+    output:
+        R + "/analysis/ultimate_{micro}.json",
+    log:
+        R + "/logs/micro_ultimate_error/{micro}.log",
+    benchmark:
+        R + "/benchmarks/micro_ultimate_error/{micro}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 3.0),
+        runtime=60,
+    params:
+        code=code("micro/ultimate_error.py"),
+        ultimate_error=config["ultimate_error"],
+    script:
+        "../scripts/micro/ultimate_error.py"

@@ -1,0 +1,98 @@
+# From the files of the scanner to the volumes that everything works on.
+
+
+# Scans that must agree before any work: all of them, or the one that the others come from.
+GIVEN = [0] if KIND == "virtual" else [0, *STATES]
+
+
+rule check_input:
+    input:
+        [scan_input(state) for state in GIVEN],
+    output:
+        R + "/input.json",
+    log:
+        f"{R}/logs/check_input/all.log",
+    benchmark:
+        R + "/benchmarks/check_input/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 3.0),
+        runtime=20,
+    params:
+        code=code("scans/check_input.py"),
+        settings=settings.scan_settings(config, 0),
+        scans=[scan_path(state) for state in GIVEN],
+    script:
+        "../scripts/scans/check_input.py"
+
+
+rule volume:
+    input:
+        checked=R + "/input.json",
+        files=lambda wildcards: scan_input(int(wildcards.state)),
+    output:
+        R + "/volumes/volume{state}.h5",
+    log:
+        R + "/logs/volume/state{state}.log",
+    benchmark:
+        R + "/benchmarks/volume/state{state}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1000, 1.0),
+        runtime=60,
+    params:
+        code=code("scans/volume.py"),
+        settings=lambda wildcards: settings.scan_settings(config, int(wildcards.state)),
+        scan=lambda wildcards: scan_path(int(wildcards.state)),
+    script:
+        "../scripts/scans/volume.py"
+
+
+rule smooth:
+    input:
+        R + "/volumes/volume{state}.h5",
+    output:
+        R + "/volumes/smooth{state}.h5",
+    log:
+        R + "/logs/smooth/state{state}.log",
+    benchmark:
+        R + "/benchmarks/smooth/state{state}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 3.0),
+        runtime=10,
+    params:
+        code=code("scans/smooth.py"),
+        images=config["images"],
+    script:
+        "../scripts/scans/smooth.py"
+
+
+rule specimen:
+    input:
+        R + "/volumes/volume0.h5",
+    output:
+        R + "/geometry/specimen.json",
+    log:
+        f"{R}/logs/specimen/all.log",
+    benchmark:
+        R + "/benchmarks/specimen/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 6.0),
+        runtime=10,
+    params:
+        code=code("scans/specimen.py"),
+        axis=AXIS,
+        platens=config.get("scans", {}).get("platens", "auto"),
+        outline=config.get("scans", {}).get("specimen", "auto"),
+    script:
+        "../scripts/scans/specimen.py"

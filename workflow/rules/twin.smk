@@ -1,0 +1,112 @@
+# Where images come from when they are not the user's: the twin, or virtual states of a real scan.
+
+if KIND == "twin":
+
+    rule twin_foam:
+        output:
+            R + "/twin/foam.h5",
+        log:
+            f"{R}/logs/twin_foam/all.log",
+        benchmark:
+            R + "/benchmarks/twin_foam/all.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(800, 3.0),
+            runtime=20,
+        params:
+            code=code("twin/twin_foam.py"),
+            twin=config["twin"],
+        script:
+            "../scripts/twin/twin_foam.py"
+
+    rule twin_mechanics:
+        input:
+            R + "/twin/foam.h5",
+        output:
+            R + "/truth/twin.h5",
+        log:
+            f"{R}/logs/twin_mechanics/all.log",
+        benchmark:
+            R + "/benchmarks/twin_mechanics/all.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 3.0),
+            runtime=60,
+        params:
+            code=code("twin/twin_mechanics.py"),
+            twin=config["twin"],
+        script:
+            "../scripts/twin/twin_mechanics.py"
+
+    rule twin_scan:
+        input:
+            foam=R + "/twin/foam.h5",
+            motion=R + "/truth/twin.h5",
+        output:
+            R + "/scans/state{state}.tif",
+        log:
+            R + "/logs/twin_scan/state{state}.log",
+        benchmark:
+            R + "/benchmarks/twin_scan/state{state}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 3.0),
+            runtime=30,
+        params:
+            code=code("twin/twin_scan.py"),
+            twin=config["twin"],
+        script:
+            "../scripts/twin/twin_scan.py"
+
+
+if KIND == "virtual":
+
+    rule virtual_field:
+        output:
+            R + "/truth/virtual.json",
+        log:
+            f"{R}/logs/virtual_field/all.log",
+        benchmark:
+            R + "/benchmarks/virtual_field/all.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(800, 3.0),
+            runtime=10,
+        params:
+            code=code("twin/virtual_field.py"),
+            virtual=config["virtual"],
+            axis=AXIS,
+        script:
+            "../scripts/twin/virtual_field.py"
+
+    rule virtual_scan:
+        input:
+            field=R + "/truth/virtual.json",
+            files=SCAN_FILES[0],
+        output:
+            R + "/scans/state{state}.tif",
+        log:
+            R + "/logs/virtual_scan/state{state}.log",
+        benchmark:
+            R + "/benchmarks/virtual_scan/state{state}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 12.0),
+            runtime=60,
+        params:
+            code=code("twin/virtual_scan.py"),
+            virtual=config["virtual"],
+            settings=settings.scan_settings(config, 0),
+            scan=config["scans"]["reference"],
+        script:
+            "../scripts/twin/virtual_scan.py"

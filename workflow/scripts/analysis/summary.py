@@ -1,0 +1,9 @@
+"""The numbers of the whole case, in one file."""
+
+from addvc.analysis.summary import summarise
+from addvc.images.files import write_json
+from addvc.runtime import job
+
+with job(snakemake):
+    numbers = {key: value for key, value in snakemake.params.items() if key != "code"}
+    write_json(snakemake.output[0], summarise(**numbers))

@@ -1,0 +1,17 @@
+"""Fig. 8: the finite elements of the struts."""
+
+from addvc.fem.io import read_vtu, write_mesh
+from addvc.geometry.micro import micro_mesh
+from addvc.geometry.surface import Surface
+from addvc.images.files import read_json, write_json
+from addvc.images.scans import load_volume
+from addvc.runtime import job
+
+with job(snakemake):
+    grey, notes = load_volume(snakemake.input.solid)
+    points, faces, _, _ = read_vtu(snakemake.input.surface)
+    gamma = read_json(snakemake.input.threshold)["threshold"]
+    mesh, figures = micro_mesh(grey, gamma, Surface(points, faces), snakemake.params.mesh)
+    write_mesh(snakemake.output.mesh, mesh)
+    keys = ("components", "kept_fraction", "dropped_voxels")
+    write_json(snakemake.output.figures, figures | {f"voxel_{key}": notes[key] for key in keys})

@@ -1,0 +1,21 @@
+"""Eq. 10: A = H + M of the micro mesh, factorised once for all states."""
+
+from addvc.correlation.micro import eq10, micro_options, micro_reference
+from addvc.correlation.store import save_factor
+from addvc.fem.io import read_vtu
+from addvc.fem.mesh import Mesh
+from addvc.fem.solver import factorise
+from addvc.images.files import read_json
+from addvc.images.scans import load_volume
+from addvc.runtime import job
+
+with job(snakemake) as log:
+    source, params = snakemake.input, snakemake.params
+    points, cells, classes, _ = read_vtu(source.mesh)
+    cell = read_json(source.cell_size)["cell_size"]
+    options = micro_options(params.micro, cell, params.axis)
+    reference = micro_reference(Mesh(points, cells), load_volume(source.reference)[0])
+    matrix, extra, weights = eq10(reference, classes["penalised"] > 0, options)
+    factor = factorise(matrix)
+    log.info("%d unknowns, %d nonzeros in the factor", len(factor.order), factor.nonzeros)
+    save_factor(snakemake.output[0], factor, extra, weights)

@@ -1,0 +1,37 @@
+"""A result as fields on its own mesh: displacement, validity, strain, residual."""
+
+import numpy as np
+
+from addvc.analysis.residuals import by_cell
+from addvc.analysis.validity import valid_nodes
+from addvc.correlation.transfer import locate
+from addvc.fem.mesh import Mesh
+from addvc.fem.operators import strain
+
+
+def result_fields(
+    mesh: Mesh, u: np.ndarray, micro: Mesh, residual: dict, noise: float
+) -> tuple[dict, dict]:
+    """Point and cell data of u (n, 3) on `mesh`, the residual being known on the `micro` mesh.
+
+    Points: displacement (voxels), valid. Cells: strain (m, 9), its Frobenius norm (the paper's von
+    Mises strain), residual (grey levels; nan in meso cells that hold no strut)."""
+    r, w, inside = residual["r"], residual["weight"], residual["inside"]
+    mean = by_cell(r, w, inside, len(micro.cells))
+    square = by_cell(r.astype(float) ** 2, w, inside, len(micro.cells))
+    if mesh.cells.shape != micro.cells.shape:
+        owner, _ = locate(mesh, micro.points[micro.cells].mean(axis=1))
+        mean, square = (by_owner(values, owner, len(mesh.cells)) for values in (mean, square))
+    tensor = strain(mesh, u)
+    points = {"displacement": u, "valid": valid_nodes(mesh, square, noise).astype(np.uint8)}
+    cells = {"strain": tensor.reshape(-1, 9), "strain_norm": np.linalg.norm(tensor, axis=(1, 2)),
+             "residual": mean}  # fmt: skip
+    return points, cells
+
+
+def by_owner(values: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+    """Mean (count,) of finite values (k,) by owner (k,); nan where there is none."""
+    known = np.isfinite(values)
+    total = np.bincount(owner[known], values[known], count)
+    number = np.bincount(owner[known], minlength=count)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)

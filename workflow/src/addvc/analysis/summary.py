@@ -1,0 +1,102 @@
+"""summary.json: what was measured, how well, at what cost."""
+
+import csv
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from addvc import __version__
+from addvc.analysis.validity import verdict
+from addvc.correlation.store import load_solution
+from addvc.fem.io import read_vtu
+from addvc.images.files import read_json
+
+PACKAGES = ("snakemake", "numpy", "scipy", "scikit-image", "scikit-sparse", "numba", "pytetwild",
+            "pymeshlab", "pymetis", "meshio", "pyvista", "matplotlib")  # fmt: skip
+
+
+def summarise(case: str, folder: str | Path, meshes: list[str], states: dict[int, str],
+              finest: str, axis: int) -> dict:  # fmt: skip
+    """The summary of results/CASE (`folder`): `meshes` from meso to micro, `states` with labels."""
+    folder = Path(folder)
+    read = lambda name: read_json(folder / name)  # noqa: E731
+    threshold, scans = read("geometry/threshold.json"), read("input.json")
+    return {
+        "case": case,
+        "cell_size": read("geometry/cell_size.json")["cell_size"],
+        "threshold": threshold["threshold"],
+        "porosity": threshold["porosity"],
+        "noise": threshold["noise"],
+        "voxel_size_um": scans["binned_voxel_size_um"],
+        "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
+        "states": [state_figures(folder, state, label, meshes, finest, axis)
+                   for state, label in states.items()],
+        "cost": costs(folder / "benchmarks"),
+        "versions": {"addvc": __version__, "python": platform.python_version()}
+        | {name: version(name) for name in PACKAGES},
+    }  # fmt: skip
+
+
+def mesh_figures(folder: Path, mesh: str) -> dict:
+    """Figures of a mesh with its ultimate error (voxels); every micro method shares one mesh."""
+    name = "micro" if mesh.startswith("micro") else mesh
+    figures = read_json(folder / f"geometry/{name}.json")
+    error = read_json(folder / f"analysis/ultimate_{mesh}.json")
+    return figures | {"ultimate_error": error["ultimate_error"]}
+
+
+def state_figures(folder: Path, state: int, label: str, meshes: list[str], finest: str,
+                  axis: int) -> dict:  # fmt: skip
+    """Verdict, measured strain and the figures of each mesh for one state."""
+    micro = [mesh for mesh in meshes if mesh.startswith("micro")][0]
+    result = {"state": state, "label": label}
+    for mesh in meshes:
+        solution, notes = load_solution(folder / f"dvc/{mesh}_state{state}.h5")
+        errors = folder / f"analysis/error_{mesh}_state{state}.json"
+        residual = read_json(folder / f"analysis/residual_{mesh}_state{state}.json")
+        _, _, point, _ = read_vtu(folder / f"fields/{mesh}_state{state}.vtu")
+        result[mesh] = {
+            "converged": solution.converged,
+            "iterations": solution.iterations,
+            "last_step": solution.history[-1],
+            "residual_std": residual["std"],
+            "residual_mean": residual["mean"],
+            "valid_nodes": float(point["valid"].mean()),
+            "seconds": solution.seconds,
+            "error": read_json(errors) if errors.exists() else None,
+        }
+    points, _, point, _ = read_vtu(folder / f"fields/{finest}_state{state}.vtu")
+    slope = np.polyfit(points[:, axis], point["displacement"][:, axis], 1)[0]
+    best = result[micro]
+    start, notes = load_solution(folder / f"dvc/start_state{state}.h5")
+    return result | {"strain": float(-slope), "start": notes["best"],
+                     "candidates": notes["candidates"],
+                     "verdict": verdict(best["converged"], best["valid_nodes"]),
+                     "struts": None}  # fmt: skip
+
+
+def costs(folder: Path) -> dict:
+    """CPU seconds, wall seconds and peak memory of each rule, over its jobs, from benchmarks."""
+    result: dict[str, dict] = {}
+    for path in sorted(folder.rglob("*.tsv")):
+        with path.open() as file:
+            row = next(csv.DictReader(file, delimiter="\t"))
+        number = {key: _number(row.get(key)) for key in ("cpu_time", "s", "max_rss")}
+        first, *_ = path.relative_to(folder).parts
+        rule = path.stem if first == "figures" else first
+        entry = result.setdefault(rule, {"jobs": 0, "cpu_s": 0.0, "wall_s": 0.0, "max_rss_mb": 0.0})
+        entry["jobs"] += 1
+        entry["cpu_s"] += number["cpu_time"]
+        entry["wall_s"] += number["s"]
+        entry["max_rss_mb"] = max(entry["max_rss_mb"], number["max_rss"])
+    return result
+
+
+def _number(text: str | None) -> float:
+    """A figure of a benchmark; "NA" where the job was too short to be sampled."""
+    try:
+        return float(text or 0)
+    except ValueError:
+        return 0.0

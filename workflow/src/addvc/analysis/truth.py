@@ -1,0 +1,36 @@
+"""Errors against a known truth: for judging only. Nothing that measures may import this module."""
+
+from pathlib import Path
+
+import numpy as np
+
+from addvc.twin.truth import Truth
+from addvc.twin.virtual import VirtualField
+
+
+def load_truth(path: str | Path) -> Truth | VirtualField:
+    """The truth of the twin (.h5) or of a virtual test (.json)."""
+    return VirtualField.load(path) if Path(path).suffix == ".json" else Truth.load(str(path))
+
+
+def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
+    """Lengths of error vectors (n, 3) in voxels: rms, median, 95th percentile, share below 1.
+
+    With the tangents (n, 3) of the struts also the rms normal to and along the strut: a slip along
+    a uniform strut cannot be seen in an image."""
+    length = np.linalg.norm(error, axis=1)
+    result = {"count": len(error), "rms": float(np.sqrt(np.mean(length**2))),
+              "median": float(np.median(length)), "p95": float(np.percentile(length, 95)),
+              "within_1_voxel": float(np.mean(length < 1))}  # fmt: skip
+    if tangent is None:
+        return result | {"rms_normal": None, "rms_along": None}
+    along = np.einsum("ni,ni->n", error, tangent)
+    normal = np.sqrt(np.maximum(length**2 - along**2, 0))
+    return result | {"rms_normal": float(np.sqrt(np.mean(normal**2))),
+                     "rms_along": float(np.sqrt(np.mean(along**2)))}  # fmt: skip
+
+
+def error_at(truth: Truth | VirtualField, points: np.ndarray, u: np.ndarray, state: int) -> dict:
+    """Error statistics of u (n, 3) measured at points (n, 3) of the reference."""
+    tangent = truth.strut(points)[1] if isinstance(truth, Truth) else None
+    return error_statistics(u - truth.displacement(points, state), tangent)

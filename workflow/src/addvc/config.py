@@ -1,0 +1,122 @@
+"""What the configuration means: names and numbers derived from it. No numerics, no imports of them."""
+
+import difflib
+import glob
+from pathlib import Path
+
+from addvc.errors import ConfigError
+
+AXES = {"x": 0, "y": 1, "z": 2}
+NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
+NOMINAL_CELL = 28.0
+TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
+
+
+def loading_axis(config: dict) -> int:
+    """0, 1 or 2."""
+    return AXES[config["loading_axis"]]
+
+
+def case_kind(config: dict) -> str:
+    """`twin`, `virtual` or `scans`: where images come from.
+
+    Raises ConfigError when the configuration says more than one thing, or too little."""
+    if "twin" in config and "scans" in config:
+        raise ConfigError("the configuration has both `twin` and `scans`; keep one of them")
+    if "virtual" in config and "scans" not in config:
+        raise ConfigError("`virtual` deforms a real scan: give scans.reference too")
+    if "scans" not in config:
+        return "twin"
+    if "virtual" in config:
+        if config["scans"].get("states"):
+            raise ConfigError("`virtual` makes the deformed states: leave out scans.states")
+        return "virtual"
+    return "scans"
+
+
+def state_strains(config: dict) -> list[float | None]:
+    """Nominal strain of each loading state, None where it is not known (real scans)."""
+    kind = case_kind(config)
+    if kind == "scans":
+        return [None] * len(config["scans"]["states"])
+    return list(config[kind]["strains"])
+
+
+def state_labels(config: dict) -> dict[int, str]:
+    """What figures call each state: its nominal strain, or its number."""
+    return {n: f"state {n}" if strain is None else f"{100 * strain:.1f} %"
+            for n, strain in enumerate(state_strains(config), start=1)}  # fmt: skip
+
+
+def meso_names(config: dict) -> list[str]:
+    """`meso33`, `meso23`, `meso12`: from coarse to fine."""
+    sizes = config["meso"].get("sizes", NOMINAL_SIZES)
+    if sorted(sizes, reverse=True) != list(sizes) or len(set(sizes)) != len(sizes):
+        raise ConfigError(f"meso.sizes {sizes} must fall from coarse to fine")
+    return [f"meso{size:g}" for size in sizes]
+
+
+def meso_size(config: dict, name: str, cell_size: float) -> float:
+    """Mean edge of a meso mesh in voxels: as given, or the paper's times cell size / 28."""
+    size = float(name.removeprefix("meso"))
+    return size if "sizes" in config["meso"] else size * cell_size / NOMINAL_CELL
+
+
+def micro_names(config: dict) -> dict[str, str]:
+    """Result name -> method of micro DVC; `micro` is the first method of micro.methods."""
+    first, *others = config["micro"]["methods"]
+    return {"micro": first} | {f"micro-{method}": method for method in others}
+
+
+def cells(value: str | float, cell_size: float, default: float) -> float:
+    """A length in voxels: as given, or `default` cell sizes for "auto"."""
+    return default * cell_size if value == "auto" else float(value)
+
+
+def scan_settings(config: dict, state: int) -> dict:
+    """How to read the scan of a state: `format` (of ScanFormat), `bin`, `crop`, `voxel_size_um`.
+
+    Scans made by the workflow itself (twin, virtual states) are TIFF pages in z, y, x order."""
+    kind = case_kind(config)
+    if kind == "twin":
+        factor = config["twin"]["bin"]
+        return {"format": {"axes": "zyx"}, "bin": factor, "crop": None,
+                "voxel_size_um": TWIN_VOXEL_UM / factor}  # fmt: skip
+    scans = config["scans"]
+    size = scans["voxel_size_um"]
+    if kind == "virtual" and state > 0:
+        return {"format": {"axes": "zyx"}, "bin": scans["bin"], "crop": None, "voxel_size_um": size}
+    keys = ("axes", "shape", "dtype", "byte_order", "header_bytes", "dataset")
+    return {"format": {key: scans[key] for key in keys if key in scans}, "bin": scans["bin"],
+            "crop": scans["crop"], "voxel_size_um": size}  # fmt: skip
+
+
+def check_keys(config: dict, schema: dict, path: str = "") -> None:
+    """ConfigError for a key that the schema does not know, with the nearest one that it does."""
+    known = schema.get("properties", {})
+    for key, value in config.items():
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, 1)
+            hint = f"did you mean `{path}{near[0]}`?" if near else "see config/README.md"
+            raise ConfigError(f"unknown key `{path}{key}`: {hint} Known here: {', '.join(known)}")
+        if isinstance(value, dict):
+            options = [known[key], *known[key].get("anyOf", [])]
+            inner = next((option for option in options if "properties" in option), None)
+            if inner:
+                check_keys(value, inner, f"{path}{key}.")
+
+
+def scan_files(path: str) -> list[str]:
+    """The files of a scan: itself, those of a folder, or those a pattern finds.
+
+    Raises ConfigError when there is none."""
+    place = Path(path)
+    if place.is_file():
+        return [path]
+    found = sorted(map(str, place.glob("*.tif*"))) if place.is_dir() else sorted(glob.glob(path))
+    if not found:
+        raise ConfigError(
+            f"scan {path} was not found (0 files; at least 1); paths start at {Path.cwd()}: correct "
+            "scans.reference or scans.states"
+        )
+    return found

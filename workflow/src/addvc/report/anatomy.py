@@ -1,0 +1,158 @@
+"""Fig. 3, 5, 7, 8, 9: the specimen, the meshes and the region, rendered."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from addvc.geometry.region import Region, caps_depth
+from addvc.images.platens import find_platens
+from addvc.images.spline import gaussian_blur
+from addvc.report import style
+from addvc.report.case import Case
+from addvc.report.scene import Layer, oblique, render
+from addvc.report.surfaces import (
+    boundary,
+    box_corners,
+    centroids,
+    compact,
+    in_box,
+    segmented,
+    whole_foam,
+)
+
+PALE_BLUE = "#9dbfe0"
+
+
+def states(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 3: the segmented foam in the reference and in each state, at one scale."""
+    numbers = [0, *case.states]
+    foams = [_foam(case, n) for n in numbers]
+    view = oblique(case.specimen.axis)
+    fit = np.vstack([points for points, _ in foams])
+    fig = style.figure(20 + 190 / len(numbers))
+    axes = fig.subplots(1, len(numbers), squeeze=False)[0]
+    for panel, (ax, state, foam) in enumerate(zip(axes, numbers, foams, strict=True)):
+        render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
+        style.headline(ax, case.labels[state] if state else "reference", panel)
+    style.scale_bar(axes[0], case.voxel_um(), 0.5)
+    style.save(fig, outputs)
+
+
+def _foam(case: Case, state: int) -> tuple[np.ndarray, np.ndarray]:
+    """Surface of the foam of a state, between its own platens where they are seen."""
+    volume, _ = case.image(state)
+    specimen = case.specimen
+    low, high = specimen.low, specimen.high
+    if state:
+        low, high = find_platens(volume, specimen.axis) or (low, high)
+    return whole_foam(volume, case.gamma, specimen, low, high)
+
+
+def meso_meshes(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 5: the meso meshes, a quarter of the cells taken away, with size and counts."""
+    fig = style.figure(76)
+    axes = fig.subplots(1, len(case.meso), squeeze=False)[0]
+    axis = case.specimen.axis
+    view = oblique(axis)
+    fit = case.mesh(case.meso[0]).points
+    for panel, (ax, name) in enumerate(zip(axes, case.meso, strict=True)):
+        mesh, facts = case.mesh(name), case.mesh_facts(name)
+        shift = centroids(mesh) - (mesh.points.min(axis=0) + mesh.points.max(axis=0)) / 2
+        hidden = (shift @ view.right > 0) & (shift @ (view.towards - view.towards[axis] * np.eye(3)[axis]) > 0)  # fmt: skip
+        outer, owner = boundary(mesh)
+        inner, inside = boundary(mesh, ~hidden)
+        keys = set(map(tuple, np.sort(outer, axis=1)))
+        skin = np.array([tuple(face) in keys for face in np.sort(inner, axis=1)])
+        colour = np.where(skin[:, None], [157, 191, 224], [240, 200, 140]).astype(np.uint8)
+        layers = [Layer(mesh.points, inner, colour, edges=True, line_width=2)]
+        render(layers, view, 170 / len(axes), fit).show(ax)
+        style.headline(ax, name, panel)
+        text = (f"mean edge {facts['mean_edge']:.1f} voxels\n{facts['nodes']:,} nodes\n"
+                f"{facts['cells']:,} tetrahedra")  # fmt: skip
+        ax.text(0.5, -0.03, text, transform=ax.transAxes, ha="center", va="top")
+    style.save(fig, outputs)
+
+
+def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
+    """Fig. 7: surface of a crop of 50 voxels a side without blur, with Eq. 8, and with 2 voxels."""
+    volume, voxel_um = case.image(0, smooth=False)
+    specimen = case.specimen
+    middle = np.array(volume.shape) / 2
+    middle[specimen.axis] = (specimen.low + specimen.high) / 2
+    middle[list(specimen.across)] = specimen.centre
+    low = np.maximum(np.round(middle).astype(int) - 25, 0)
+    crop = volume[tuple(slice(a, a + 50) for a in low)]
+    share = float(np.mean(gaussian_blur(crop, sigma) > case.gamma))
+    fig = style.figure(70)
+    axes = fig.subplots(1, 3)
+    cube = box_corners(np.zeros(3), np.array(crop.shape) - 1.0)
+    for panel, (ax, width) in enumerate(zip(axes, (0.0, sigma, 2.0), strict=True)):
+        grey = gaussian_blur(crop, width)
+        gamma = float(np.quantile(grey, 1 - share)) if width > sigma else case.gamma
+        points, faces = segmented(grey, gamma, np.zeros(3), np.array(crop.shape))
+        render([Layer(points, faces)], oblique(specimen.axis), 56, cube, True).show(ax)
+        extra = {0.0: "no blur", sigma: f"σ = {sigma:g} voxels (used)"}
+        style.headline(ax, extra.get(width, f"σ = {width:g} voxels (exaggerated)"), panel)
+    style.scale_bar(axes[0], voxel_um)
+    style.save(fig, outputs)
+
+
+def region(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 8: (a) the region in the whole foam, (b) its mesh close up."""
+    volume, voxel_um = case.image(0)
+    specimen, limits = case.specimen, Region(**case.json("geometry/region.json"))
+    view = oblique(specimen.axis)
+    fig = style.figure(92)
+    left, right = fig.subplots(1, 2)
+    points, faces = whole_foam(volume, case.gamma, specimen, specimen.low, specimen.high)
+    ends, sides = caps_depth(limits, points[faces].mean(axis=1))
+    outside = np.minimum(ends, sides) < 0
+    mesh = case.mesh("micro")
+    chosen, _ = boundary(mesh)
+    layers = [Layer(points, faces[outside]), Layer(mesh.points, chosen, style.BLUE)]
+    render(layers, view, 80, shadows=True).show(left)
+    style.scale_bar(left, voxel_um)
+    style.headline(left, "region of micro DVC (blue) in the foam (grey)", 0)
+    _close_up(right, mesh, case, view)
+    style.scale_bar(right, voxel_um)
+    facts = case.mesh_facts("micro")
+    style.headline(right, "the mesh close up", 1)
+    right.text(1, -0.04, f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra\n"
+               f"mean volume {facts['mean_volume']:.2f} voxel³", transform=right.transAxes,
+               ha="right", va="top")  # fmt: skip
+    style.save(fig, outputs)
+
+
+def _close_up(ax, mesh, case: Case, view) -> None:
+    """Edges of the mesh in a box of one cell around its densest place near the middle."""
+    half = 0.5 * case.cell_size
+    middle = mesh.points.mean(axis=0)
+    where = centroids(mesh)
+    near = where[np.linalg.norm(where - middle, axis=1) < 1.5 * case.cell_size]
+    tries = near[:: max(1, len(near) // 200)]
+    counts = [in_box(near, x - half / 2, x + half / 2).sum() for x in tries]
+    centre = tries[int(np.argmax(counts))]
+    faces, _ = boundary(mesh, in_box(where, centre - half, centre + half))
+    points, faces, _ = compact(mesh.points, faces)
+    layer = Layer(points, faces, PALE_BLUE, edges=True, line_width=1.5)
+    render([layer], view, 80).show(ax)
+
+
+def penalised(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 9: nodes of the ends and of the sides, whose curvature is penalised (D_L)."""
+    mesh, kind = case.mesh("micro"), case.penalised()
+    colours = np.array([[212, 216, 221], [61, 134, 207], [224, 130, 20]], dtype=np.uint8)
+    faces, _ = boundary(mesh)
+    on_faces = colours[kind[faces].max(axis=1)]
+    axis = case.specimen.axis
+    fig = style.figure(88)
+    axes = fig.subplots(1, 2)
+    for panel, (ax, view) in enumerate(zip(axes, (oblique(axis), oblique(axis, 35, 75)), strict=True)):  # fmt: skip
+        render([Layer(mesh.points, faces, on_faces)], view, 80, shadows=True).show(ax)
+        style.headline(ax, ("from the side", "from above")[panel], panel)
+    style.scale_bar(axes[0], case.voxel_um())
+    names = ("equilibrium gap", "curvature, ends", "curvature, sides")
+    handles = [style.line(tuple(c / 255), f"{name}, {np.sum(kind == n):,} nodes", "", "s")
+               for n, (c, name) in enumerate(zip(colours, names, strict=True))]  # fmt: skip
+    fig.legend(handles=handles, loc="outside lower center", ncols=3, columnspacing=1)
+    style.save(fig, outputs)

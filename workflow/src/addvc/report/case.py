@@ -1,0 +1,123 @@
+"""The results of one case on disk, as figures and tables read them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from addvc.correlation.gauss_newton import Solution
+from addvc.correlation.store import load_solution
+from addvc.fem.io import read_mesh, read_vtu
+from addvc.fem.mesh import Mesh
+from addvc.images.files import read_json
+from addvc.images.scans_store import load_volume
+from addvc.images.specimen import Specimen
+
+
+class UndeclaredInput(RuntimeError):
+    """A figure reads a file that its rule does not name, so that a change would not remake it."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Folder of results, states with their labels, names of the meso meshes (coarse to fine) and of
+    the micro results; `inputs`: the only files that may be read (None for any)."""
+
+    root: Path
+    labels: dict[int, str]
+    meso: tuple[str, ...]
+    micro: tuple[str, ...]
+    inputs: frozenset[Path] | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, description: dict, inputs: Iterable[str] | None = None) -> "Case":
+        """From {root, labels, meso, micro}, and the input files of the job."""
+        allowed = None if inputs is None else frozenset(Path(name) for name in inputs)
+        labels = {int(n): label for n, label in description["labels"].items()}
+        return cls(Path(description["root"]), labels, tuple(description["meso"]),
+                   tuple(description["micro"]), allowed)  # fmt: skip
+
+    @property
+    def states(self) -> list[int]:
+        return sorted(self.labels)
+
+    @property
+    def finest(self) -> str:
+        """The finest meso mesh."""
+        return self.meso[-1]
+
+    def path(self, name: str) -> Path:
+        """A file of the case; UndeclaredInput unless the job declares it."""
+        path = self.root / name
+        if self.inputs is not None and path not in self.inputs:
+            raise UndeclaredInput(f"{path} is not among the {len(self.inputs)} inputs of this job; "
+                                  "add it to the rule in workflow/rules/figures.smk")  # fmt: skip
+        return path
+
+    def json(self, name: str) -> dict:
+        return read_json(self.path(name))
+
+    @property
+    def specimen(self) -> Specimen:
+        return Specimen.from_dict(self.json("geometry/specimen.json"))
+
+    @property
+    def gamma(self) -> float:
+        """The threshold between void and solid."""
+        return float(self.json("geometry/threshold.json")["threshold"])
+
+    @property
+    def cell_size(self) -> float:
+        """Voxels."""
+        return float(self.json("geometry/cell_size.json")["cell_size"])
+
+    def image(self, state: int, smooth: bool = True) -> tuple[np.ndarray, float]:
+        """Volume (nx, ny, nz) of a state, 0 for the reference, and its voxel size in micrometres."""
+        volume, attrs = load_volume(self.path(image_name(state, smooth)))
+        return volume, float(attrs["voxel_size_um"])
+
+    def voxel_um(self) -> float:
+        """Voxel size of the binned images, without reading one."""
+        with h5py.File(self.path(image_name(0))) as file:
+            return float(file["volume"].attrs["voxel_size_um"])
+
+    def mesh(self, name: str) -> Mesh:
+        return read_mesh(self.path(f"geometry/{name.split('-')[0]}.vtu"))
+
+    def mesh_facts(self, name: str) -> dict:
+        return self.json(f"geometry/{name.split('-')[0]}.json")
+
+    def penalised(self) -> np.ndarray:
+        """0 free or bulk, 1 ends, 2 sides for each node (n,) of the micro mesh (Fig. 9)."""
+        return read_vtu(self.path("geometry/micro.vtu"))[2]["penalised"].ravel()
+
+    def solution(self, mesh: str, state: int) -> Solution:
+        return load_solution(self.path(f"dvc/{mesh}_state{state}.h5"))[0]
+
+    def displacement(self, mesh: str, state: int) -> np.ndarray:
+        """u (n, 3) in voxels at the nodes of the micro mesh, of a micro or a meso result."""
+        middle = "" if mesh in self.micro else "_on_micro"
+        with h5py.File(self.path(f"dvc/{mesh}{middle}_state{state}.h5")) as file:
+            return file["u"][:].astype(np.float64)
+
+    def residual(self, mesh: str, state: int) -> tuple[np.ndarray, np.ndarray, dict]:
+        """r (Q,) at the micro Gauss points, cell by cell, with weight 0 outside of the image."""
+        with h5py.File(self.path(f"analysis/residual_{mesh}_state{state}.h5")) as file:
+            weight = np.where(file["inside"][:], file["weight"][:], 0.0)
+            return file["r"][:], weight, dict(file["r"].parent.attrs)
+
+    def converged(self, mesh: str, state: int) -> bool:
+        with h5py.File(self.path(f"dvc/{mesh}_state{state}.h5")) as file:
+            return bool(file.attrs["converged"])
+
+    def title(self, state: int, *meshes: str) -> str:
+        """The label of a state; `failed` with the names of those of the meshes that failed."""
+        failed = [mesh for mesh in meshes if not self.converged(mesh, state)]
+        which = "" if len(meshes) == 1 else f" ({', '.join(failed)})"
+        return self.labels[state] + (f": failed{which}" if failed else "")
+
+
+def image_name(state: int, smooth: bool = True) -> str:
+    return f"volumes/{'smooth' if smooth else 'volume'}{state}.h5"

@@ -1,0 +1,158 @@
+"""Fig. 4 and 12, and beyond the paper: convergence of every mesh, errors against a truth."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from addvc.report import style
+from addvc.report.case import Case
+from addvc.report.slices import slice_across
+
+
+def cell_size(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 4: (a) radial autocorrelation with its secondary peak, (b) a slice of the reference."""
+    fig = style.figure(72)
+    left, right = fig.subplots(1, 2, width_ratios=(1.1, 1))
+    volume, voxel_um = case.image(0, smooth=False)
+    _autocorrelation(left, case.json("geometry/cell_size.json"), voxel_um)
+    style.headline(left, "autocorrelation of the reference", 0)
+    slice_across(right, volume, case.specimen)
+    style.scale_bar(right, voxel_um)
+    style.headline(right, "slice across the loading axis", 1)
+    style.save(fig, outputs)
+
+
+def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
+    """The curve, its peak, and radii in micrometres along the top."""
+    radius, curve = np.array(found["radius"]), np.array(found["correlation"])
+    size = found["cell_size"]
+    ax.plot(radius, curve, color=style.DARK)
+    ax.axhline(0, color="#999999", lw=0.6, zorder=0)
+    measured = found["source"] == "measured"
+    text = f"{'cell size' if measured else 'cell size, as configured'}\n{size:.1f} voxels = {size * voxel_um:.0f} µm"  # fmt: skip
+    at = float(np.interp(size, radius, curve))
+    if measured:
+        ax.plot(size, at, "o", color=style.RED, ms=6, zorder=3)
+    else:
+        ax.axvline(size, color=style.RED, ls="--", lw=1)
+    tail = curve[radius > 0.3 * size]
+    reach = max(tail.max() - min(tail.min(), 0), 0.02)
+    ax.set_ylim(min(tail.min(), 0) - 0.2 * reach, at + 2.6 * reach)
+    ax.annotate(text, (size, at), (0.52, 0.72), textcoords="axes fraction", color=style.RED,
+                arrowprops={"arrowstyle": "-", "color": style.RED, "lw": 0.7})  # fmt: skip
+    ax.set(xlabel="radius (voxels)", ylabel="normalised autocorrelation (–)", xlim=(0, radius[-1]))
+    top = ax.secondary_xaxis("top", functions=(lambda x: x * voxel_um, lambda x: x / voxel_um))
+    top.set_xlabel("radius (µm)")
+
+
+def histograms(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 12: density of r over the struts, all states, for the finest meso mesh and each micro."""
+    names = [case.finest, *case.micro]
+    fig = style.figure(72)
+    axes = fig.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
+    reach = _reach(case)
+    for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
+        for state in case.states:
+            _density(ax, case, name, state, reach)
+        kind = "mesoscale" if name == case.finest else "microscale"
+        style.headline(ax, f"{kind} ({name})", number)
+        ax.set_xlabel("residual r (grey levels)")
+        ax.legend(loc="upper left", handlelength=1.2, borderaxespad=0.1)
+    low, high = axes[0].get_ylim()
+    axes[0].set(ylabel="density (1 / grey level)", xlim=(-reach, reach),
+                ylim=(low, low + (high - low) * (1.05 + 0.09 * len(case.states))))  # fmt: skip
+    style.save(fig, outputs)
+
+
+def _reach(case: Case) -> float:
+    """Half width of the histograms: 4 standard deviations of the worst result that converged."""
+    sigma = [case.residual(name, state)[2]["std"]
+             for name in (case.finest, *case.micro) for state in case.states
+             if case.converged(name, state)]  # fmt: skip
+    return 4 * float(max(sigma)) if sigma else 100.0
+
+
+def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
+    """One histogram, weighted by volume; dashed when the state failed."""
+    r, weight, stats = case.residual(name, state)
+    counts, edges = np.histogram(r, bins=120, range=(-reach, reach), weights=weight)
+    density = counts / (weight.sum() * np.diff(edges))
+    failed = not case.converged(name, state)
+    label = f"{case.title(state, name)}, σ = {stats['std']:.2f}"
+    ax.plot((edges[1:] + edges[:-1]) / 2, density, color=style.SERIES[(state - 1) % 6],
+            ls="--" if failed else "-", lw=1.3, label=label)  # fmt: skip
+
+
+def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float]) -> None:
+    """rms(du) of each Gauss-Newton iteration, a panel a mesh; `tolerance` of `meso` and `micro`."""
+    names = [*case.meso, *case.micro]
+    columns = min(len(names), 5)
+    rows = -(-len(names) // columns)
+    fig = style.figure(14 + 56 * rows)
+    axes = fig.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for number, (ax, name) in enumerate(zip(axes, names, strict=False)):
+        for state in case.states:
+            _steps(ax, case, name, state)
+        limit = tolerance["micro" if name in case.micro else "meso"]
+        ax.axhline(limit, color="#777777", lw=0.8, ls=":")
+        ax.set(yscale="log", xlabel="iteration")
+        ax.xaxis.get_major_locator().set_params(integer=True)
+        style.headline(ax, name, number)
+    for ax in axes[len(names) :]:
+        ax.set_axis_off()
+    for ax in axes[::columns]:
+        ax.set_ylabel("rms(du) (voxels)")
+    handles = [style.line(style.SERIES[(n - 1) % 6], case.labels[n]) for n in case.states]
+    handles += [style.line("#777777", "criterion", ls=":"),
+                style.line(style.RED, "failed", ls="", marker="x")]  # fmt: skip
+    fig.legend(handles=handles, loc="outside lower center", ncols=6)
+    style.save(fig, outputs)
+
+
+def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
+    """History of one result, with a cross at its end when it failed."""
+    solution = case.solution(name, state)
+    steps = np.arange(1, solution.iterations + 1)
+    colour = style.SERIES[(state - 1) % 6]
+    ax.plot(steps, solution.history, "o-", color=colour, ms=2.5, lw=1.1)
+    if not solution.converged:
+        ax.plot(steps[-1:], solution.history[-1:], "x", color=style.RED, ms=7, mew=2, zorder=4)
+
+
+def errors(case: Case, outputs: Iterable[str]) -> None:
+    """Error against the truth at the micro nodes: rms with p95, and its parts at each strut."""
+    names = [*case.meso, *case.micro]
+    fig = style.figure(88)
+    axes = fig.subplots(1, 2, sharey=True)
+    for number, (ax, text) in enumerate(zip(axes, ("whole error: rms, and p95 above it",
+                                            "rms normal to the strut, and along it"), strict=True)):  # fmt: skip
+        style.headline(ax, text, number)
+        ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
+        ax.set_xticklabels([case.labels[n] for n in case.states])
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.grid(axis="y", which="both", lw=0.3, color="#dddddd")
+    for place, name in enumerate(names):
+        for column, state in enumerate(case.states):
+            found = case.json(f"analysis/error_{name}_state{state}.json")
+            if found:
+                x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
+                _error(axes, x, found, place, case.converged(name, state))
+    axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")
+    handles = [style.line(style.SERIES[n % 6], name, ls="", marker=style.MARKERS[n % 6])
+               for n, name in enumerate(names)]  # fmt: skip
+    handles += [style.line("#555555", "p95 / along the strut", ls="", marker="_"),
+                style.line(style.RED, "failed", ls="", marker="x")]  # fmt: skip
+    fig.legend(handles=handles, loc="outside lower center", ncols=-(-len(handles) // 2))
+    style.save(fig, outputs)
+
+
+def _error(axes, x: float, found: dict, place: int, converged: bool) -> None:
+    """Marks of one result in both panels."""
+    colour, marker = style.SERIES[place % 6], style.MARKERS[place % 6]
+    for ax, main, other in ((axes[0], "rms", "p95"), (axes[1], "rms_normal", "rms_along")):
+        ax.plot([x, x], [found[main], found[other]], color=colour, lw=0.8)
+        ax.plot(x, found[other], "_", color=colour, ms=7, mew=1.5)
+        ax.plot(x, found[main], marker, color=colour, ms=4.5)
+        if not converged:
+            ax.plot(x, found[main], "x", color=style.RED, ms=8, mew=1.8, zorder=4)

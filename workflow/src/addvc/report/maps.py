@@ -1,0 +1,88 @@
+"""Fig. 13 and 15: residual, displacement and strain on the struts, meso beside micro."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from addvc.fem.mesh import Mesh
+from addvc.fem.operators import strain
+from addvc.report import style
+from addvc.report.case import Case
+from addvc.report.scene import Layer, facing, oblique, render
+from addvc.report.surfaces import boundary, centroids, compact, slab
+
+
+def residual_maps(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 13: mean residual of each micro cell, a row a method, a column a state."""
+    mesh, names = case.mesh("micro"), [case.finest, *case.micro]
+    faces, owner = boundary(mesh)
+    view = oblique(case.specimen.axis)
+    values = {(name, n): _cell_residual(case, name, n)[owner] for name in names
+              for n in case.states}  # fmt: skip
+    usable = [v for (name, n), v in values.items() if case.converged(name, n)]
+    norm = style.robust_range(usable or list(values.values()), signed=True, share=1)
+    columns = len(case.states)
+    shape = np.ptp(view.project(mesh.points), axis=0)
+    fig = style.figure(8 + len(names) * (10 + min(1.4, shape[1] / shape[0]) * 150 / columns))
+    axes = fig.subplots(len(names), columns, squeeze=False)
+    for row, name in enumerate(names):
+        for column, state in enumerate(case.states):
+            layer = Layer(mesh.points, faces, values=values[name, state], norm=norm,
+                          cmap=style.SIGNED)  # fmt: skip
+            ax = axes[row, column]
+            render([layer], view, 150 / columns).show(ax)
+            style.headline(ax, case.title(state, name), row * columns + column)
+            if column == 0:
+                ax.text(-0.03, 0.5, name, transform=ax.transAxes, rotation=90, ha="right",
+                        va="center", fontsize=9)  # fmt: skip
+    style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
+    style.colour_bar(fig, axes, norm, style.SIGNED, "residual r (grey levels)", shrink=0.6)
+    style.save(fig, outputs)
+
+
+def _cell_residual(case: Case, name: str, state: int) -> np.ndarray:
+    """Weighted mean of r over the Gauss points of each micro cell (m,); 0 outside of the image."""
+    r, weight, _ = case.residual(name, state)
+    cells = len(case.mesh("micro").cells)
+    total = (r * weight).reshape(cells, -1).sum(axis=1)
+    return total / np.maximum(weight.reshape(cells, -1).sum(axis=1), 1e-12)
+
+
+def fields(case: Case, outputs: Iterable[str], state: int) -> None:
+    """Fig. 15: u_x, u_y, u_z and the norm of the strain in a slice a cell thick; left the finest
+    meso mesh, right micro DVC."""
+    mesh = case.mesh("micro")
+    normal, low, high = slab(mesh, case.specimen.axis, case.cell_size)
+    where = centroids(mesh)[:, normal]
+    faces, owner = boundary(mesh, (where >= low) & (where <= high))
+    names = (case.finest, "micro")
+    rows = [_components(mesh, case.displacement(name, state), owner) for name in names]
+    labels = [f"$u_{x}$ ({style.voxels(case.voxel_um())})" for x in style.AXES]
+    labels.append(r"strain $\|\varepsilon\|_F$ (–)")
+    points, faces, used = compact(mesh.points, faces)
+    view = facing(case.specimen.axis, normal)
+    shape = np.ptp(view.project(points), axis=0)
+    fig = style.figure(8 + 4 * (7 + 62 * min(0.78, shape[1] / shape[0])))
+    axes = fig.subplots(4, 2)
+    for d, label in enumerate(labels):
+        pair = [row[d] if d == 3 else row[d][used] for row in rows]
+        norm, cmap = _strain_range(pair) if d == 3 else style.component_range(pair)
+        for column, (name, values) in enumerate(zip(names, pair, strict=True)):
+            layer = Layer(points, faces, values=values, norm=norm, cmap=cmap)
+            render([layer], view, 70).show(axes[d, column])
+            text = f"{'mesoscale' if column == 0 else 'microscale'}, {case.title(state, name)}"
+            style.headline(axes[d, column], text, 2 * d + column)
+        style.colour_bar(fig, axes[d], norm, cmap, label, aspect=16, shrink=0.9, pad=0.02)
+    style.scale_bar(axes[-1, 0], case.voxel_um())
+    style.save(fig, outputs)
+
+
+def _components(mesh: Mesh, u: np.ndarray, owner: np.ndarray) -> list[np.ndarray]:
+    """u_x, u_y, u_z (n,) of the nodes, and the strain norm (f,) of the cells behind the faces."""
+    return [*u.T, np.linalg.norm(strain(mesh, u)[owner], axis=(1, 2))]
+
+
+def _strain_range(pair: list[np.ndarray]) -> tuple[style.Normalize, str]:
+    """From zero to what all but 2 % of both stay below, each counting half."""
+    top = max(float(np.percentile(values, 98)) for values in pair)
+    return style.Normalize(0, top), style.MAGNITUDE

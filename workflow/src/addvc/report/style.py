@@ -1,0 +1,118 @@
+"""How figures look: sizes, fonts, colours, ranges, bars, and how they are written."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from addvc.images.files import atomic_path
+
+INCH = 1 / 25.4
+WIDTH = 170.0  # mm, the text width of a page
+DPI = 300
+MAGNITUDE, SIGNED = "viridis", "RdBu_r"
+SOLID, BLUE, RED, ORANGE, DARK = "#d4d8dd", "#3d86cf", "#c8341f", "#e08214", "#303438"
+SERIES = ("#440154", "#31688e", "#35b779", "#e6a000", "#c51b7d", "#7f7f7f")
+MARKERS = "osD^vP"
+AXES = "xyz"
+
+plt.rcParams.update({
+    "font.size": 8.5, "axes.titlesize": 9, "axes.labelsize": 8.5, "legend.fontsize": 8,
+    "xtick.labelsize": 8, "ytick.labelsize": 8, "figure.titlesize": 9.5,
+    "axes.linewidth": 0.7, "lines.linewidth": 1.4, "legend.frameon": False,
+    "axes.spines.top": False, "axes.spines.right": False, "savefig.dpi": DPI,
+    "svg.hashsalt": "addvc", "image.interpolation": "antialiased",
+})  # fmt: skip
+
+
+def figure(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure of a size in millimetres."""
+    return plt.figure(figsize=(width * INCH, height * INCH), layout="constrained")
+
+
+def letter(number: int) -> str:
+    """(a), (b), ... for 0, 1, ..."""
+    return f"({chr(ord('a') + number)})"
+
+
+def headline(ax: Axes, text: str, number: int | None = None) -> None:
+    """Title of a panel with its letter; in red when it tells of a failure."""
+    lead = "" if number is None else f"{letter(number)} "
+    ax.set_title(lead + text, loc="left", color=RED if "failed" in text else "black")
+
+
+def robust_range(values: Iterable[np.ndarray], signed: bool = False, share: float = 0.5) -> Normalize:  # fmt: skip
+    """Range of all values but `share` percent at either end; symmetric about 0 if `signed`."""
+    flat = np.concatenate([np.ravel(v)[np.isfinite(np.ravel(v))] for v in values])
+    low, high = np.percentile(flat, (share, 100 - share))
+    if signed:
+        low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
+    if high - low < 1e-9:
+        low, high = low - 0.5e-3, high + 0.5e-3
+    return Normalize(float(low), float(high))
+
+
+def component_range(values: list[np.ndarray]) -> tuple[Normalize, str]:
+    """Range and map of a displacement component: diverging about 0 when both signs matter."""
+    norm = robust_range(values)
+    span = norm.vmax - norm.vmin
+    if norm.vmin < -0.15 * span and norm.vmax > 0.15 * span:
+        return robust_range(values, signed=True), SIGNED
+    return norm, MAGNITUDE if norm.vmax > 0 and norm.vmin > -0.15 * span else f"{MAGNITUDE}_r"
+
+
+def colour_bar(fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options) -> None:  # fmt: skip
+    """A colour bar with pointed ends, since ranges are robust; its width is left to the layout."""
+    mappable = ScalarMappable(norm, cmap)
+    bar = fig.colorbar(mappable, ax=axes, extend="both", extendfrac=0.03, **options)
+    bar.set_label(label)
+    bar.ax.tick_params(length=2.5, width=0.6)
+    bar.outline.set_linewidth(0.5)
+
+
+def voxels(voxel_um: float) -> str:
+    """The unit of lengths, with its size."""
+    return f"voxels of {voxel_um:.3g} µm"
+
+
+def nice_length(reach: float) -> float:
+    """The largest of 1, 2, 5, 10, ... that is at most `reach`."""
+    power = 10 ** np.floor(np.log10(reach))
+    return float(power * max(m for m in (1, 2, 5) if m * power <= reach * (1 + 1e-9)))
+
+
+def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3, colour: str = "black") -> None:
+    """A bar below the picture, about `share` of its width, with its length in both units."""
+    left, right = sorted(ax.get_xlim())
+    length = nice_length(share * (right - left))
+    micro = length * voxel_um
+    size = f"{micro / 1000:.3g} mm" if micro >= 1000 else f"{micro:.3g} µm"
+    end = length / (right - left)
+    ax.plot([0, end], [-0.025, -0.025], color=colour, lw=2, transform=ax.transAxes,
+            clip_on=False, solid_capstyle="butt")  # fmt: skip
+    ax.text(0, -0.04, f"{length:g} voxels = {size}", transform=ax.transAxes, va="top", ha="left",
+            fontsize=8, color=colour)  # fmt: skip
+
+
+def save(fig: Figure, outputs: Iterable[str | Path]) -> None:
+    """Write to each name (PNG or SVG), the same bytes for the same data, and close the figure."""
+    for name in outputs:
+        vector = Path(name).suffix == ".svg"
+        with atomic_path(name) as temporary:
+            fig.savefig(temporary, metadata={"Date": None} if vector else {"Software": None})
+    plt.close(fig)
+
+
+def line(colour: str, label: str, ls: str = "-", marker: str = "") -> Line2D:
+    """An entry of a legend."""
+    return Line2D([], [], color=colour, label=label, ls=ls, marker=marker, ms=5, mew=1.5)

@@ -1,0 +1,76 @@
+"""What every job shares: its log, its threads, and the way an error is told. Used by scripts only."""
+
+import contextlib
+import logging
+import os
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+from addvc.errors import AddvcError
+
+
+def job_name(rule: str, wildcards: dict) -> str:
+    """`meso_dvc meso12 2`: the rule and its wildcards, for the head of each line."""
+    return " ".join([rule, *(str(value) for value in wildcards.values())])
+
+
+@contextlib.contextmanager
+def job(snakemake) -> Iterator[logging.Logger]:
+    """Progress to the terminal and to the log of the job; threads as the scheduler gave them.
+
+    An error the user can mend (AddvcError) is told in one paragraph and ends the job with status 1;
+    any other keeps its traceback, which goes to the log as well."""
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    path = Path(snakemake.log[0])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name = job_name(snakemake.rule, dict(snakemake.wildcards.items()))
+    log = logging.getLogger("addvc")
+    log.setLevel(logging.INFO)
+    handlers = [logging.FileHandler(path, mode="w"), logging.StreamHandler(sys.stderr)]
+    for handler in handlers:
+        handler.setFormatter(logging.Formatter(f"%(asctime)s [{name}] %(message)s", "%H:%M:%S"))
+        log.addHandler(handler)
+    start = time.perf_counter()
+    try:
+        with threads(snakemake.threads):
+            yield log
+        log.info("done in %.1f s", time.perf_counter() - start)
+    except AddvcError as error:
+        log.error("ERROR: %s", error)
+        sys.exit(1)
+    except Exception:
+        log.error("%s", traceback.format_exc())
+        sys.exit(1)
+    finally:
+        for handler in handlers:
+            log.removeHandler(handler)
+            handler.close()
+
+
+@contextlib.contextmanager
+def threads(count: int) -> Iterator[None]:
+    """numba and BLAS on at most `count` threads: BLAS threads inside parallel kernels cost time."""
+    import numba
+    from threadpoolctl import threadpool_limits
+
+    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    with threadpool_limits(limits=count):
+        yield
+
+
+def progress(log: logging.Logger, what: str, every: float = 10.0):
+    """A callback (done, total) that says how far `what` is, and the time left, every few seconds."""
+    start = time.perf_counter()
+    last = [start]
+
+    def tell(done: int, total: int) -> None:
+        now = time.perf_counter()
+        if now - last[0] >= every and done:
+            last[0] = now
+            left = (now - start) * (total - done) / done
+            log.info("%s: %d of %d, about %.0f s left", what, done, total, left)
+
+    return tell
