@@ -1,6 +1,7 @@
 # Where images come from when they are not the user's: the twin, or virtual states of a real scan.
 
 if KIND == "twin":
+    TWIN = config["twin"] | {"porosity": config["porosity"]}
 
     rule twin_foam:
         output:
@@ -17,7 +18,7 @@ if KIND == "twin":
             runtime=20,
         params:
             code=code("twin/twin_foam.py"),
-            twin=config["twin"],
+            twin=TWIN,
         script:
             "../scripts/twin/twin_foam.py"
 
@@ -38,7 +39,7 @@ if KIND == "twin":
             runtime=60,
         params:
             code=code("twin/twin_mechanics.py"),
-            twin=config["twin"],
+            twin=TWIN,
         script:
             "../scripts/twin/twin_mechanics.py"
 
@@ -60,7 +61,7 @@ if KIND == "twin":
             runtime=30,
         params:
             code=code("twin/twin_scan.py"),
-            twin=config["twin"],
+            twin=TWIN,
         script:
             "../scripts/twin/twin_scan.py"
 

@@ -26,6 +26,9 @@ def case_kind(config: dict) -> str:
     if "virtual" in config and "scans" not in config:
         raise ConfigError("`virtual` deforms a real scan: give scans.reference too")
     if "scans" not in config:
+        if config.get("loading_axis", "y") != "y":
+            raise ConfigError(f"loading_axis is {config['loading_axis']}, but the twin is compressed "
+                              "along y: leave loading_axis out")  # fmt: skip
         return "twin"
     if "virtual" in config:
         if config["scans"].get("states"):

@@ -9,7 +9,7 @@ from addvc.images.platens import find_platens
 from addvc.images.spline import gaussian_blur
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, oblique, render
+from addvc.report.scene import Layer, aspect, oblique, render
 from addvc.report.surfaces import (
     boundary,
     box_corners,
@@ -29,12 +29,11 @@ def states(case: Case, outputs: Iterable[str]) -> None:
     foams = [_foam(case, n) for n in numbers]
     view = oblique(case.specimen.axis)
     fit = np.vstack([points for points, _ in foams])
-    fig = style.figure(20 + 190 / len(numbers))
-    axes = fig.subplots(1, len(numbers), squeeze=False)[0]
-    for panel, (ax, state, foam) in enumerate(zip(axes, numbers, foams, strict=True)):
+    fig, axes = style.panels(1, len(numbers), aspect(view, fit))
+    for panel, (ax, state, foam) in enumerate(zip(axes[0], numbers, foams, strict=True)):
         render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state] if state else "reference", panel)
-    style.scale_bar(axes[0], case.voxel_um(), 0.5)
+    style.scale_bar(axes[0, 0], case.voxel_um(), 0.5)
     style.save(fig, outputs)
 
 
@@ -112,7 +111,7 @@ def region(case: Case, outputs: Iterable[str]) -> None:
     layers = [Layer(points, faces[outside]), Layer(mesh.points, chosen, style.BLUE)]
     render(layers, view, 80, shadows=True).show(left)
     style.scale_bar(left, voxel_um)
-    style.headline(left, "region of micro DVC (blue) in the foam (grey)", 0)
+    style.headline(left, "region (blue) in the foam (grey)", 0)
     _close_up(right, mesh, case, view)
     style.scale_bar(right, voxel_um)
     facts = case.mesh_facts("micro")
@@ -126,9 +125,9 @@ def region(case: Case, outputs: Iterable[str]) -> None:
 def _close_up(ax, mesh, case: Case, view) -> None:
     """Edges of the mesh in a box of one cell around its densest place near the middle."""
     half = 0.5 * case.cell_size
-    middle = mesh.points.mean(axis=0)
     where = centroids(mesh)
-    near = where[np.linalg.norm(where - middle, axis=1) < 1.5 * case.cell_size]
+    near = where[np.linalg.norm(where - mesh.points.mean(axis=0), axis=1) < 3 * half]
+    near = near if len(near) else where
     tries = near[:: max(1, len(near) // 200)]
     counts = [in_box(near, x - half / 2, x + half / 2).sum() for x in tries]
     centre = tries[int(np.argmax(counts))]

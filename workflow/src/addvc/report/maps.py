@@ -4,12 +4,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from addvc.fem.mesh import Mesh
 from addvc.fem.operators import strain
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, facing, oblique, render
-from addvc.report.surfaces import boundary, centroids, compact, slab
+from addvc.report.scene import Layer, aspect, facing, oblique, render
+from addvc.report.surfaces import boundary, clipped, slab, slab_box
 
 
 def residual_maps(case: Case, outputs: Iterable[str]) -> None:
@@ -22,9 +21,7 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     usable = [v for (name, n), v in values.items() if case.converged(name, n)]
     norm = style.robust_range(usable or list(values.values()), signed=True, share=1)
     columns = len(case.states)
-    shape = np.ptp(view.project(mesh.points), axis=0)
-    fig = style.figure(8 + len(names) * (10 + min(1.4, shape[1] / shape[0]) * 150 / columns))
-    axes = fig.subplots(len(names), columns, squeeze=False)
+    fig, axes = style.panels(len(names), columns, aspect(view, mesh.points), 8, 18, below=6)
     for row, name in enumerate(names):
         for column, state in enumerate(case.states):
             layer = Layer(mesh.points, faces, values=values[name, state], norm=norm,
@@ -36,7 +33,7 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
                 ax.text(-0.03, 0.5, name, transform=ax.transAxes, rotation=90, ha="right",
                         va="center", fontsize=9)  # fmt: skip
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
-    style.colour_bar(fig, axes, norm, style.SIGNED, "residual r (grey levels)", shrink=0.6)
+    style.colour_bar(fig, axes, norm, style.SIGNED, "residual r (grey levels)", shrink=0.7, aspect=30)
     style.save(fig, outputs)
 
 
@@ -51,25 +48,20 @@ def _cell_residual(case: Case, name: str, state: int) -> np.ndarray:
 def fields(case: Case, outputs: Iterable[str], state: int) -> None:
     """Fig. 15: u_x, u_y, u_z and the norm of the strain in a slice a cell thick; left the finest
     meso mesh, right micro DVC."""
-    mesh = case.mesh("micro")
-    normal, low, high = slab(mesh, case.specimen.axis, case.cell_size)
-    where = centroids(mesh)[:, normal]
-    faces, owner = boundary(mesh, (where >= low) & (where <= high))
     names = (case.finest, "micro")
-    rows = [_components(mesh, case.displacement(name, state), owner) for name in names]
+    slices = [_slice(case, name, state) for name in names]
     labels = [f"$u_{x}$ ({style.voxels(case.voxel_um())})" for x in style.AXES]
     labels.append(r"strain $\|\varepsilon\|_F$ (–)")
-    points, faces, used = compact(mesh.points, faces)
-    view = facing(case.specimen.axis, normal)
-    shape = np.ptp(view.project(points), axis=0)
-    fig = style.figure(8 + 4 * (7 + 62 * min(0.78, shape[1] / shape[0])))
-    axes = fig.subplots(4, 2)
+    view = facing(case.specimen.axis, slab(case.mesh("micro"), case.specimen.axis, 1)[0])
+    shape = min(aspect(view, slices[0][0]), 0.95)
+    fig, axes = style.panels(4, 2, 0.8 * shape, 8, 20, below=6)
     for d, label in enumerate(labels):
-        pair = [row[d] if d == 3 else row[d][used] for row in rows]
+        pair = [fields[d] for _, _, fields in slices]
         norm, cmap = _strain_range(pair) if d == 3 else style.component_range(pair)
-        for column, (name, values) in enumerate(zip(names, pair, strict=True)):
-            layer = Layer(points, faces, values=values, norm=norm, cmap=cmap)
-            render([layer], view, 70).show(axes[d, column])
+        for column, name in enumerate(names):
+            points, faces, _ = slices[column]
+            layer = Layer(points, faces, values=pair[column], norm=norm, cmap=cmap)
+            render([layer], view, 75).show(axes[d, column])
             text = f"{'mesoscale' if column == 0 else 'microscale'}, {case.title(state, name)}"
             style.headline(axes[d, column], text, 2 * d + column)
         style.colour_bar(fig, axes[d], norm, cmap, label, aspect=16, shrink=0.9, pad=0.02)
@@ -77,9 +69,14 @@ def fields(case: Case, outputs: Iterable[str], state: int) -> None:
     style.save(fig, outputs)
 
 
-def _components(mesh: Mesh, u: np.ndarray, owner: np.ndarray) -> list[np.ndarray]:
-    """u_x, u_y, u_z (n,) of the nodes, and the strain norm (f,) of the cells behind the faces."""
-    return [*u.T, np.linalg.norm(strain(mesh, u)[owner], axis=(1, 2))]
+def _slice(case: Case, name: str, state: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Points, triangles, and u_x, u_y, u_z of the points with the strain norm of the triangles, in
+    the slice of Fig. 14."""
+    mesh, u = case.mesh("micro"), case.displacement(name, state)
+    low, high = slab_box(mesh, case.specimen.axis, case.cell_size)
+    norm = np.linalg.norm(strain(mesh, u), axis=(1, 2))
+    points, faces, found = clipped(mesh, low, high, u=u, strain=norm)
+    return points, faces, [*found["u"].T, found["strain"]]
 
 
 def _strain_range(pair: list[np.ndarray]) -> tuple[style.Normalize, str]:

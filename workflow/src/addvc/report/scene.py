@@ -80,6 +80,12 @@ def oblique(axis: int, azimuth: float = 35.0, elevation: float = 22.0) -> View:
     return View(right, np.cross(towards, right), towards)
 
 
+def aspect(view: View, points: np.ndarray) -> float:
+    """Height over width of a picture that holds points (n, 3)."""
+    width, height = np.ptp(view.project(points), axis=0)
+    return float(height / width)
+
+
 @cache
 def plotter_class():
     """pyvista.Plotter that draws off screen; AddvcError with the package to install if it cannot."""

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Colormap, FuncNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -40,6 +40,20 @@ def figure(height: float, width: float = WIDTH) -> Figure:
     return plt.figure(figsize=(width * INCH, height * INCH), layout="constrained")
 
 
+def panels(rows: int, columns: int, aspect: float, spare: float = 12.0, bar: float = 0.0,
+           below: float = 0.0) -> tuple[Figure, np.ndarray]:  # fmt: skip
+    """A figure of pictures of one aspect (height / width), axes (rows, columns). Millimetres: `spare`
+    above and below each row for words, `bar` at the right of it, `below` the last row."""
+    width = (WIDTH - bar - 4) / columns - 3
+    fig = figure(rows * (aspect * width + spare) + below)
+    return fig, fig.subplots(rows, columns, squeeze=False)
+
+
+def signed(value: float, digits: int = 2) -> str:
+    """A number with a true minus sign."""
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
 def letter(number: int) -> str:
     """(a), (b), ... for 0, 1, ..."""
     return f"({chr(ord('a') + number)})"
@@ -62,13 +76,25 @@ def robust_range(values: Iterable[np.ndarray], signed: bool = False, share: floa
     return Normalize(float(low), float(high))
 
 
-def component_range(values: list[np.ndarray]) -> tuple[Normalize, str]:
-    """Range and map of a displacement component: diverging about 0 when both signs matter."""
+def component_range(values: list[np.ndarray], root: bool = False) -> tuple[Normalize, str]:
+    """Range and map of a displacement component: diverging about 0 when both signs matter.
+
+    `root`: colours follow the square root, so that small states show beside large ones."""
     norm = robust_range(values)
     span = norm.vmax - norm.vmin
-    if norm.vmin < -0.15 * span and norm.vmax > 0.15 * span:
-        return robust_range(values, signed=True), SIGNED
-    return norm, MAGNITUDE if norm.vmax > 0 and norm.vmin > -0.15 * span else f"{MAGNITUDE}_r"
+    both = norm.vmin < -0.15 * span and norm.vmax > 0.15 * span
+    norm = robust_range(values, signed=True) if both else norm
+    if root:
+        norm = FuncNorm((_root, _square), norm.vmin, norm.vmax)
+    return norm, SIGNED if both else MAGNITUDE if norm.vmin > -0.15 * span else f"{MAGNITUDE}_r"
+
+
+def _root(x: np.ndarray) -> np.ndarray:
+    return np.sign(x) * np.sqrt(np.abs(x))
+
+
+def _square(x: np.ndarray) -> np.ndarray:
+    return np.sign(x) * np.square(x)
 
 
 def colour_bar(fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options) -> None:  # fmt: skip

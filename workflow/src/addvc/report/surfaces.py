@@ -47,6 +47,28 @@ def box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), -1).reshape(-1, 3)
 
 
+def clipped(mesh: Mesh, low, high, **fields: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict]:
+    """Surface of the part of a tetrahedral mesh inside a box, cut by planes: points, triangles, and
+    `fields`, each (n, ...) of the points or (m, ...) of the cells behind the triangles."""
+    import pyvista
+
+    near = (mesh.points[mesh.cells].max(axis=1) >= low) & (mesh.points[mesh.cells].min(axis=1) <= high)  # fmt: skip
+    points, cells, used = compact(mesh.points, mesh.cells[near.all(axis=1)])
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: cells}, points)
+    for name, values in fields.items():
+        on_points = len(values) == len(mesh.points)
+        target = grid.point_data if on_points else grid.cell_data
+        target[name] = values[used] if on_points else values[near.all(axis=1)]
+    for d in range(3):
+        for bound, sign in ((low[d], 1.0), (high[d], -1.0)):
+            if grid.n_cells and (sign * (grid.points[:, d] - bound) < 0).any():
+                axis = np.eye(3)[d]
+                grid = grid.clip(normal=sign * axis, origin=bound * axis, invert=False)
+    surface = grid.extract_surface(algorithm="dataset_surface").triangulate()
+    found = {name: np.asarray(surface[name]) for name in fields}
+    return np.asarray(surface.points, float), surface.faces.reshape(-1, 4)[:, 1:], found
+
+
 def segmented(volume: np.ndarray, gamma: float, low, high) -> tuple[np.ndarray, np.ndarray]:
     """Closed surface of {grey > gamma} within a box (voxels): points (n, 3), triangles (f, 3).
 
@@ -79,3 +101,11 @@ def slab(mesh: Mesh, axis: int, thickness: float) -> tuple[int, float, float]:
     low, high = mesh.points[:, normal].min(), mesh.points[:, normal].max()
     half = min(thickness, high - low) / 2
     return normal, (low + high) / 2 - half, (low + high) / 2 + half
+
+
+def slab_box(mesh: Mesh, axis: int, thickness: float) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the slice of Fig. 14."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    normal, first, last = slab(mesh, axis, thickness)
+    low[normal], high[normal] = first, last
+    return low, high

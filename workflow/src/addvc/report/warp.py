@@ -8,8 +8,16 @@ from scipy.spatial import cKDTree
 from addvc.fem.mesh import Mesh
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, Picture, View, facing, render
-from addvc.report.surfaces import boundary, box_corners, centroids, compact, in_box, segmented, slab
+from addvc.report.scene import Layer, Picture, View, aspect, facing, render
+from addvc.report.surfaces import (
+    boundary,
+    box_corners,
+    clipped,
+    in_box,
+    segmented,
+    slab,
+    slab_box,
+)
 
 MESO, MICRO = "#e0903c", "#3d86cf"
 
@@ -18,61 +26,55 @@ def warped(case: Case, outputs: Iterable[str], state: int) -> None:
     """Fig. 16: slices of (a) I_r, (b) I_d, and of the micro mesh carried by (c) meso, (d) micro."""
     mesh, axis = case.mesh("micro"), case.specimen.axis
     u = {name: case.displacement(name, state) for name in (case.finest, "micro")}
-    low, high = _slice_box(mesh, axis, case.cell_size)
-    end = [corner + _mean_motion(mesh, u["micro"], corner, axis) for corner in (low, high)]
-    image = segmented(case.image(state)[0], case.gamma, *end)
-    bodies = [segmented(case.image(0)[0], case.gamma, low, high), image,
-              *(_cut(mesh, u[name], *end) for name in u)]  # fmt: skip
+    before = slab_box(mesh, axis, case.cell_size)
+    after = _carried_box(mesh, u["micro"], before, axis)
+    image = segmented(case.image(state)[0], case.gamma, *after)
+    bodies = [segmented(case.image(0)[0], case.gamma, *before), image,
+              *(_cut(mesh, u[name], *after) for name in u)]  # fmt: skip
     titles = ["segmented $I_r$", f"segmented $I_d$, {case.labels[state]}",
-              *(f"$I_r$ carried by {name}" + _failure(case, name, state) for name in u)]  # fmt: skip
-    colours = (style.SOLID, style.SOLID, MESO, MICRO)
+              *(f"$I_r$ carried by {name}{_failure(case, name, state)}" for name in u)]  # fmt: skip
     view = facing(axis, slab(mesh, axis, 1)[0])
-    fit = np.vstack([box_corners(low, high), box_corners(*end)])
-    fig = style.figure(_height(view, fit, rows=2))
-    axes = fig.subplots(2, 2).ravel()
-    for panel, (ax, body) in enumerate(zip(axes, bodies, strict=True)):
-        render([Layer(*body, colours[panel])], view, 82, fit, shadows=True).show(ax)
+    fit = np.vstack([box_corners(*before), box_corners(*after)])
+    fig, axes = style.panels(2, 2, min(aspect(view, fit), 1.2), spare=14)
+    for panel, (ax, body) in enumerate(zip(axes.flat, bodies, strict=True)):
+        layer = Layer(*body, (style.SOLID, style.SOLID, MESO, MICRO)[panel])
+        render([layer], view, 82, fit, shadows=True).show(ax)
         style.headline(ax, titles[panel], panel)
         if panel > 1:
-            gap = _gap(body[0], image)
-            ax.text(1, -0.025, f"distance to $I_d$: median {np.median(gap):.2f}, p95 "
-                    f"{np.percentile(gap, 95):.2f} voxels", transform=ax.transAxes, ha="right",
-                    va="top", fontsize=8)  # fmt: skip
-    style.scale_bar(axes[2], case.voxel_um(), 0.2)
+            _write_gap(ax, _gap(body[0], image))
+    style.scale_bar(axes[0, 0], case.voxel_um(), 0.2)
     style.save(fig, outputs)
+
+
+def _write_gap(ax, gap: np.ndarray) -> None:
+    """Below a panel, how far the carried surface is from the segmented image."""
+    text = f"distance to $I_d$: median {np.median(gap):.2f}, p95 {np.percentile(gap, 95):.2f} voxels"
+    ax.text(0.5, -0.02, text, transform=ax.transAxes, ha="center", va="top")
 
 
 def _failure(case: Case, name: str, state: int) -> str:
     return "" if case.converged(name, state) else " (failed)"
 
 
-def _height(view: View, fit: np.ndarray, rows: int) -> float:
-    """Height of a figure with two columns of pictures of `fit`, millimetres."""
-    width, height = np.ptp(view.project(fit), axis=0)
-    return rows * (14 + 82 * min(height / width, 1.25))
-
-
-def _slice_box(mesh: Mesh, axis: int, thickness: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of the slice of Fig. 14."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    normal, low[normal], high[normal] = slab(mesh, axis, thickness)
+def _carried_box(mesh: Mesh, u: np.ndarray, box: tuple, axis: int) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """The box of a slice after the motion of its nodes: its ends follow the ends of the mesh, its
+    faces the median; across it holds whatever has moved out."""
+    low, high = (corner.copy() for corner in box)
+    normal = slab(mesh, axis, 1)[0]
+    other = 3 - axis - normal
+    inside = (mesh.points[:, normal] >= low[normal]) & (mesh.points[:, normal] <= high[normal])
+    low[other], high[other] = np.percentile((mesh.points + u)[inside, other], (0.2, 99.8))
+    reach = 0.05 * np.ptp(mesh.points[:, axis]) + 1
+    for corner in (low, high):
+        near = np.abs(mesh.points[:, axis] - corner[axis]) < reach
+        corner[axis] += np.median(u[near, axis])
+        corner[normal] += np.median(u[inside, normal])
     return low, high
 
 
-def _mean_motion(mesh: Mesh, u: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
-    """Median displacement near the end of the mesh that a corner of its box lies on."""
-    reach = 0.05 * np.ptp(mesh.points[:, axis]) + 1
-    near = np.abs(mesh.points[:, axis] - corner[axis]) < reach
-    middle = np.median(u, axis=0)
-    middle[axis] = np.median(u[near, axis])
-    return middle
-
-
 def _cut(mesh: Mesh, u: np.ndarray, low, high) -> tuple[np.ndarray, np.ndarray]:
-    """Surface of the mesh carried by u, of the cells that end up in a box."""
-    faces, _ = boundary(mesh, in_box(centroids(mesh, u), low, high))
-    points, faces, _ = compact(mesh.points + u, faces)
-    return points, faces
+    """Surface of the mesh carried by u, inside a box."""
+    return clipped(Mesh(mesh.points + u, mesh.cells), low, high)[:2]
 
 
 def _gap(points: np.ndarray, image: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -93,8 +95,7 @@ def zoom(case: Case, outputs: Iterable[str], state: int) -> None:
     half = 0.45 * case.cell_size
     places = _places(mesh, np.linalg.norm(u["micro"] - u[case.finest], axis=1), half)
     deformed, gamma = case.image(state)[0], case.gamma
-    fig = style.figure(62 * len(places))
-    axes = fig.subplots(len(places), 3, squeeze=False)
+    fig, axes = style.panels(len(places), 3, 1.0)
     for row, node in enumerate(places):
         view = _across(u["micro"][node] - u[case.finest][node], case.specimen.axis)
         for column, name in enumerate((None, *u)):
@@ -118,8 +119,8 @@ def _zoom(mesh: Mesh, u: dict, name: str | None, node: int, half: float, deforme
     box = centre - half, centre + half
     fit = centre + half * np.vstack([view.right + view.up, -view.right - view.up])
     if name is None:
-        return render([Layer(*_cut(mesh, np.zeros_like(mesh.points), *box))], view, 55, fit, True)
-    layers = [Layer(*segmented(deformed, gamma, *box), style.SOLID, opacity=0.55),
+        return render([Layer(*_cut(mesh, np.zeros_like(mesh.points), *box))], view, 55, fit)
+    layers = [Layer(*segmented(deformed, gamma, *box), style.SOLID, opacity=0.6, smooth=True),
               Layer(*_cut(mesh, u[name], *box), style.RED)]  # fmt: skip
     return render(layers, view, 55, fit)
 

@@ -1,0 +1,14 @@
+"""The first page of the report, and the configuration as it was used."""
+
+from pathlib import Path
+
+from addvc.images.files import atomic_path, read_json, write_json
+from addvc.report.words import front_page
+from addvc.runtime import job
+
+with job(snakemake):
+    summary = read_json(snakemake.input.summary)
+    text = front_page(summary, snakemake.config, read_json(snakemake.input.scans))
+    with atomic_path(snakemake.output.page) as temporary:
+        Path(temporary).write_text(text)
+    write_json(snakemake.output.config, snakemake.config)

@@ -1,0 +1,12 @@
+"""The report as one HTML file, by snakemake's own report of all figures."""
+
+from addvc.report.build import build_report
+from addvc.runtime import job
+
+with job(snakemake):
+    build_report(
+        snakemake.output[0],
+        snakemake.params.snakefile,
+        snakemake.input.config,
+        snakemake.params.target,
+    )

@@ -1,0 +1,161 @@
+"""The words that go with the numbers: closing lines in the terminal, front page of the report."""
+
+import yaml
+
+from addvc.errors import AddvcError
+
+VERDICTS = {
+    "converged": "converged",
+    "flagged": "measured, with doubtful places",
+    "failed": "FAILED: not to be used",
+}
+
+
+def closing_lines(summary: dict, folder: str) -> str:
+    """A few lines for the end of a run: what was made, where, each state's verdict, what next."""
+    lines = [f"addvc: case {summary['case']} is done; results are in {folder}/"]
+    micro = micro_name(summary)
+    for state in summary["states"]:
+        found = state[micro]
+        lines.append(
+            f"  state {state['state']} ({state['strain']:.1%} measured): "
+            f"{VERDICTS[state['verdict']]}; sigma(r) {found['residual_std']:.2f}, "
+            f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
+            + error_words(found["error"])
+        )
+    lines.append(f"  open the report: xdg-open {folder}/report.html")
+    return "\n".join(lines)
+
+
+def error_words(error: dict | None) -> str:
+    """Median and 95th percentile of the error, where a truth is known."""
+    if not error:
+        return ""
+    return f", error median {error['median']:.3f}, p95 {error['p95']:.3f} voxel"
+
+
+def micro_name(summary: dict) -> str:
+    """The default micro method: the first of them."""
+    return next(mesh for mesh in summary["meshes"] if mesh.startswith("micro"))
+
+
+def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
+    """A table in reStructuredText."""
+    lines = ["", ".. list-table::", "   :header-rows: 1", ""]
+    for row in [header, *rows]:
+        lines += [("   * - " if n == 0 else "     - ") + str(cell) for n, cell in enumerate(row)]
+    return [*lines, ""]
+
+
+def heading(text: str, line: str = "-") -> list[str]:
+    """A heading in reStructuredText."""
+    return ["", text, line * len(text), ""]
+
+
+def front_page(summary: dict, config: dict, scans: dict) -> str:
+    """First page of the report (reStructuredText): the answer, what to distrust, the provenance."""
+    lines = heading(f"addvc: case {summary['case']}", "=")
+    lines += answer(summary)
+    lines += heading("Warnings and failures") + warnings(summary)
+    lines += heading("Residual and error of each mesh") + results_table(summary)
+    lines += heading("Convergence") + convergence_table(summary)
+    lines += heading("Meshes") + meshes_table(summary)
+    lines += heading("Cost") + cost_table(summary["cost"])
+    lines += heading("Scans") + scans_table(scans)
+    lines += heading("Configuration") + ["::", ""]
+    lines += ["   " + line for line in yaml.safe_dump(config, sort_keys=False).splitlines()]
+    lines += heading("Versions")
+    lines += [", ".join(f"{name} {number}" for name, number in summary["versions"].items())]
+    return "\n".join(lines) + "\n"
+
+
+def answer(summary: dict) -> list[str]:
+    """What was measured, in a few sentences."""
+    size = summary["voxel_size_um"]
+    lines = [f"Displacement of the solid at {len(summary['states'])} loading states. Cell size "
+             f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
+             f"threshold {summary['threshold']:.1f} grey levels for a porosity of "
+             f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.", ""]  # fmt: skip
+    for state in summary["states"]:
+        found = state[micro_name(summary)]
+        lines.append(f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
+                     f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
+                     f"valid{error_words(found['error'])}.")  # fmt: skip
+    return lines
+
+
+def warnings(summary: dict) -> list[str]:
+    """What to distrust; "None." when there is nothing, so that the section is never silently empty."""
+    found = []
+    for state in summary["states"]:
+        for mesh in summary["meshes"]:
+            one = state[mesh]
+            if not one["converged"]:
+                found.append(f"- State {state['state']}, {mesh}: the loop did not end in "
+                             f"{one['iterations']} iterations (last rms(du) {one['last_step']:.1e} "
+                             "voxel). Look at the residual maps (Fig. 13); a longer "
+                             "regularisation length or a better start may help.")  # fmt: skip
+        if state["verdict"] == "failed":
+            found.append(f"- State {state['state']} could not be registered: over half of its nodes "
+                         "have a residual far above the noise of the images.")  # fmt: skip
+    micro = summary["meshes"][micro_name(summary)]
+    kept = micro["kept_fraction"] * micro["voxel_kept_fraction"]
+    if kept < 0.9:
+        found.append(f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
+                     "and was left out; lower mesh.size, the porosity or images.blur.")  # fmt: skip
+    return found or ["None."]
+
+
+def results_table(summary: dict) -> list[str]:
+    """sigma(r) on the micro quadrature and, with a truth, the error at bulk nodes."""
+    known = any(state[mesh]["error"] for state in summary["states"] for mesh in summary["meshes"])
+    header = ["state", "mesh", "sigma(r), grey levels"]
+    header += ["error median, voxel", "error p95, voxel", "error rms, voxel"] if known else []
+    rows = []
+    for state in summary["states"]:
+        for mesh in summary["meshes"]:
+            error = state[mesh]["error"] or {}
+            row = [state["label"], mesh, f"{state[mesh]['residual_std']:.3f}"]
+            rows.append(row + [f"{error[key]:.3f}" for key in ("median", "p95", "rms") if error])
+    return list_table(header, rows)
+
+
+def convergence_table(summary: dict) -> list[str]:
+    """Start, iterations and last step of every state and mesh."""
+    rows = [[state["label"], state["start"], mesh, str(state[mesh]["iterations"]),
+             f"{state[mesh]['last_step']:.1e}", "yes" if state[mesh]["converged"] else "NO"]
+            for state in summary["states"] for mesh in summary["meshes"]]  # fmt: skip
+    return list_table(["state", "start", "mesh", "iterations", "last rms(du), voxel", "converged"],
+                      rows)  # fmt: skip
+
+
+def meshes_table(summary: dict) -> list[str]:
+    """Size, quality and ultimate error of each mesh."""
+    rows = [[name, str(m["nodes"]), str(m["cells"]), f"{m['mean_edge']:.2f}",
+             f"{m['mean_volume']:.3g}", f"{m['min_dihedral']:.1f}", f"{m['ultimate_error']:.2e}"]
+            for name, m in summary["meshes"].items()]  # fmt: skip
+    return list_table(["mesh", "nodes", "cells", "mean edge, voxel", "mean volume, voxel^3",
+                       "least dihedral angle, degrees", "ultimate error, voxel"], rows)  # fmt: skip
+
+
+def cost_table(cost: dict) -> list[str]:
+    """CPU time, wall time and peak memory of each rule, the dearest first."""
+    rows = [[rule, str(c["jobs"]), f"{c['cpu_s']:.0f}", f"{c['wall_s']:.0f}", f"{c['max_rss_mb']:.0f}"]
+            for rule, c in sorted(cost.items(), key=lambda item: -item[1]["cpu_s"])]  # fmt: skip
+    return list_table(["rule", "jobs", "CPU, s", "wall, s", "peak memory, MB"], rows)
+
+
+def scans_table(scans: dict) -> list[str]:
+    """The input files with their fingerprints."""
+    rows = [[row["path"], " x ".join(map(str, row["shape"])), row["dtype"], row["fingerprint"][:16]]
+            for row in scans["scans"]]  # fmt: skip
+    return list_table(["file", "shape, voxels", "type", "fingerprint"], rows)
+
+
+def check_verdicts(summary: dict, strict: bool) -> None:
+    """With `strict`, AddvcError when a state has failed."""
+    failed = [state["label"] for state in summary["states"] if state["verdict"] == "failed"]
+    if strict and failed:
+        raise AddvcError(f"strict is on and {len(failed)} of {len(summary['states'])} states failed "
+                         f"({', '.join(failed)}; at most 0): see Warnings in the report, or set "
+                         "strict: false")  # fmt: skip
