@@ -50,7 +50,7 @@ def rigid_motions():
 
 @pytest.fixture(scope="session")
 def speckle():
-    """speckle(shape, length): periodic random grey levels whose autocorrelation is 1/e at `length`."""
+    """speckle(shape, length): periodic random grey levels, correlated 1/e at `length` voxels."""
 
     def make(shape, length=4.0):
         noise = np.random.default_rng(SEED).standard_normal(shape)
@@ -61,32 +61,26 @@ def speckle():
 
 
 @pytest.fixture(scope="session")
-def waves():
-    """waves(points, shortest): grey levels (n,) of plane waves, known exactly at any points (n, 3)."""
+def stretched():
+    """stretched(shape, slope, centre, shortest): I_r and I_d of u = slope (x - centre).
 
-    def make(points, shortest=8.0, count=60):
+    Grey levels are plane waves of `shortest` voxels to three times that, so that both are exact."""
+
+    def waves(shape, way, phase):
+        lines = [np.exp(1j * np.outer(np.arange(n), way[:, d])) for d, n in enumerate(shape)]
+        planes = (lines[1][:, None] * lines[2]).reshape(-1, len(way))
+        grey = np.real((lines[0] * np.exp(1j * phase)) @ planes.T).reshape(shape)
+        return (110 + 40 * grey / np.sqrt(len(way) / 2)).astype(np.float32)
+
+    def make(shape, slope, centre, shortest=8.0, count=80):
         rng = np.random.default_rng(SEED)
-        direction = rng.standard_normal((count, 3))
-        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        way = rng.standard_normal((count, 3))
         length = shortest * rng.uniform(1, 3, count)
+        way *= (2 * np.pi / length / np.linalg.norm(way, axis=1))[:, None]
         phase = rng.uniform(0, 2 * np.pi, count)
-        grey = np.zeros(len(points))
-        for way, period, start in zip(direction, length, phase, strict=True):
-            grey += np.cos(points @ (2 * np.pi / period * way) + start)
-        return 110 + 40 * grey / np.sqrt(count / 2)
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def stretched(waves):
-    """stretched(shape, slope, centre, shortest): I_r and I_d of u = slope (x - centre), exactly."""
-
-    def make(shape, slope, centre, shortest=8.0):
-        voxels = np.indices(shape).reshape(3, -1).T.astype(float)
-        source = (voxels - centre) @ np.linalg.inv(np.eye(3) + slope).T + centre
-        images = (waves(points, shortest).reshape(shape) for points in (voxels, source))
-        return [image.astype(np.float32) for image in images]
+        back = np.linalg.inv(np.eye(3) + slope)  # x = back (y - centre) + centre
+        moved = phase + way @ (centre - back @ centre)
+        return waves(shape, way, phase), waves(shape, way @ back, moved)
 
     return make
 

@@ -66,15 +66,17 @@ def test_shift_without_pairs_is_unknown():
     mask = np.zeros((6, 6, 6), bool)
     mask[:3] = True
     found = autocorrelation(voxels((6, 6, 6))[..., 0].astype(np.float32), mask)
-    assert np.isnan(found[3:]).all()
-    assert np.isfinite(found[:3]).all()
+    lag = np.minimum(np.arange(len(found)), len(found) - np.arange(len(found)))
+    assert np.isnan(found[lag >= 3]).all()
+    assert np.isfinite(found[lag < 3][:, :6, :6]).all()
 
 
 def test_radial_average_of_a_function_of_the_distance():
-    distance = np.linalg.norm(voxels((40, 40, 40)), axis=-1)
-    radius, curve = radial_average(np.exp(-distance / 8))
+    lag = np.minimum(np.arange(60), 60 - np.arange(60))
+    distance = np.sqrt(lag[:, None, None] ** 2 + lag[:, None] ** 2 + lag**2)
+    radius, curve = radial_average(np.exp(-distance / 8), 24)
     assert_array_equal(radius, np.arange(24))
-    assert_allclose(curve, np.exp(-radius / 8), atol=0.01)
+    assert_allclose(curve, np.exp(-radius / 8), atol=0.03)  # shells are a voxel thick
 
 
 @pytest.mark.parametrize("length", [14.0, 20.0])
@@ -105,7 +107,7 @@ def test_peak_of_a_known_curve_is_found_between_voxels():
 
 def test_curve_without_a_second_peak_is_an_error():
     radius = np.arange(40)
-    with pytest.raises(GeometryError, match=r"no secondary peak up to 39 voxels.*set geometry.cell"):
+    with pytest.raises(GeometryError, match=r"no secondary peak up to 39 voxels.*set geometry"):
         secondary_peak(radius, np.exp(-radius / 5))
 
 
@@ -152,7 +154,7 @@ def test_porosity_must_be_a_share(porosity):
 
 def test_porosity_that_no_threshold_gives_is_an_error():
     grey = np.repeat([20.0, 110.0], [500, 500])
-    with pytest.raises(GeometryError, match=r"porosity of 0.8: the nearest is 0.5000 at grey level"):
+    with pytest.raises(GeometryError, match=r"porosity of 0.8: the nearest is 0.5000 at grey"):
         bisect_threshold(grey, 0.8)
 
 
@@ -165,7 +167,7 @@ def test_contrast_of_two_levels(rng):
 
 
 def test_threshold_in_the_noise_is_an_error(rng):
-    with pytest.raises(GeometryError, match=r"threshold 24.0 is within 2 standard .*raise porosity"):
+    with pytest.raises(GeometryError, match=r"threshold 24.0 is within 2 .*raise porosity"):
         check_contrast(rng.normal(20, 5, 10_000), 24.0)
 
 
@@ -187,7 +189,7 @@ def test_region_of_a_box_cuts_its_sides():
 
 
 def test_empty_region_is_an_error():
-    with pytest.raises(GeometryError, match=r"micro.region keeps 1.8 voxels .* 5.3 to 44.8\); at least"):
+    with pytest.raises(GeometryError, match=r"micro.region keeps 1.8 voxels .* 44.8\); at least 4"):
         micro_region(CYLINDER, {"low": 40})
 
 
@@ -286,7 +288,8 @@ def test_remeshing_stays_closed_and_on_the_surface():
     check_watertight(after, "sphere")
     assert enclosed_volume(after) == pytest.approx(enclosed_volume(before), rel=0.02)
     assert np.abs(np.linalg.norm(after.points - [20.3, 19.6, 20.1], axis=1) - 12.3).max() < 0.4
-    sides = np.linalg.norm(after.points[after.faces] - after.points[np.roll(after.faces, 1, 1)], axis=2)
+    corner = after.points[after.faces]
+    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
     assert sides.mean() == pytest.approx(2.0, rel=0.15)
 
 

@@ -32,7 +32,8 @@ def tets(box):
 @pytest.fixture
 def hexes():
     """A grid with uneven lines, its inner nodes moved."""
-    mesh = hex_grid([a + (b - a) * np.array([0, 0.3, 0.7, 1]) for a, b in zip(LOW, HIGH, strict=True)])
+    shares = np.array([0, 0.3, 0.7, 1])
+    mesh = hex_grid([a + (b - a) * shares for a, b in zip(LOW, HIGH, strict=True)])
     inner = np.all((mesh.points > LOW) & (mesh.points < HIGH), axis=1)
     move = np.random.default_rng(2417).uniform(-0.5, 0.5, mesh.points.shape)
     return Mesh(mesh.points + move * inner[:, None], mesh.cells)
@@ -121,7 +122,7 @@ def test_figures_of_a_good_mesh(tets):
 
 
 def test_check_refuses_an_empty_mesh(tets):
-    with pytest.raises(MeshError, match="micro: no cells; .* widen it"):
+    with pytest.raises(MeshError, match=r"micro: no cells; .* widen it"):
         check_mesh(submesh(tets, np.zeros(len(tets.cells), bool)), "micro")
 
 
@@ -134,12 +135,12 @@ def test_check_refuses_inverted_cells(tets):
 
 
 def test_check_refuses_loose_pieces(box):
-    with pytest.raises(MeshError, match=r"micro: 1 pieces are not attached.*limit 0\); keep the la"):
+    with pytest.raises(MeshError, match=r"micro: 1 pieces are not attached.*limit 0\); keep"):
         check_mesh(two_boxes(box)[0], "micro")
 
 
 def test_check_refuses_flat_tets(tets):
-    with pytest.raises(MeshError, match=r"have a dihedral angle below 80 degrees \(smallest .*lower"):
+    with pytest.raises(MeshError, match=r"dihedral angle below 80 degrees \(smallest .*lower"):
         check_mesh(tets, "micro", min_dihedral=80)
 
 

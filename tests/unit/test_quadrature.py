@@ -39,7 +39,8 @@ def test_gauss_points_integrate_quadratics_over_a_box(box):
 def test_voxels_of_a_box_are_each_owned_once(box, shake):
     mesh = box((2, 3, 1), (14, 18, 13), (3, 5, 4), shake)
     quadrature = voxel_points(mesh, SHAPE)
-    expected = np.argwhere(np.ones((13, 16, 13))) + [2, 3, 1]
+    first = np.array([2, 3, 1])
+    expected = first + np.argwhere(np.ones((13, 16, 13)))
     assert_array_equal(quadrature.points, expected)
     assert_array_equal(quadrature.weight, 1)
 
@@ -50,6 +51,15 @@ def test_voxels_lie_in_the_cells_that_own_them(mesh):
     assert_allclose(quadrature.shape.sum(axis=1), 1, atol=1e-12)
     back = interpolate(mesh.cells, quadrature.cell, quadrature.shape, mesh.points)
     assert_allclose(back, quadrature.points, atol=1e-12)
+
+
+def test_voxel_on_a_shared_face_goes_to_the_cell_with_the_smaller_number(mesh):
+    quadrature = voxel_points(mesh, SHAPE)
+    owner = np.full(len(quadrature), len(mesh.cells))
+    for cell in reversed(range(len(mesh.cells))):
+        weights = barycentric(mesh, np.full(len(quadrature), cell), quadrature.points)
+        owner[weights.min(axis=1) > -1e-9] = cell
+    assert_array_equal(quadrature.cell, owner)
 
 
 def test_half_voxel_box_counts_its_voxels_as_its_volume(box):
@@ -80,7 +90,8 @@ LINES = [np.array([0.0, 4.0, 13.0, 19.0]), np.array([1.5, 7.2, 15.0]), np.array(
 
 def test_lattice_shares_out_its_voxels_once():
     quadrature = lattice_points(LINES, SHAPE)
-    assert_array_equal(quadrature.points, np.argwhere(np.ones((20, 14, 18))) + [0, 2, 0])
+    first = np.array([0, 2, 0])
+    assert_array_equal(quadrature.points, first + np.argwhere(np.ones((20, 14, 18))))
     assert quadrature.shape.min() >= 0
     assert_allclose(quadrature.shape.sum(axis=1), 1, atol=1e-12)
 

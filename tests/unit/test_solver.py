@@ -31,7 +31,8 @@ def test_solution_to_round_off(mesh, rng):
 def test_factor_times_its_transpose_is_the_permuted_matrix(mesh):
     a = system(mesh)
     factor = factorise(a)
-    assert abs(factor.lower @ factor.lower.T - a.tocsr()[factor.order][:, factor.order]).max() < 1e-12
+    permuted = a.tocsr()[factor.order][:, factor.order]
+    assert abs(factor.lower @ factor.lower.T - permuted).max() < 1e-12
     assert sparse.triu(factor.lower, 1).nnz == 0
     assert factor.nonzeros == factor.lower.nnz
 
@@ -49,7 +50,8 @@ def test_order_is_a_permutation_that_keeps_nodes_together_and_fills_less(mesh, r
     a = system(mesh)
     order = dissection(a)
     assert_array_equal(np.sort(order), np.arange(a.shape[0]))
-    assert_array_equal(order.reshape(-1, 3) - order[::3, None], np.tile([0, 1, 2], (len(order) // 3, 1)))
+    by_node = order.reshape(-1, 3)
+    assert_array_equal(by_node, by_node[:, :1] + [0, 1, 2])
     assert factorise(a, order).nonzeros < factorise(a, rng.permutation(a.shape[0])).nonzeros
 
 
@@ -72,10 +74,10 @@ def test_singular_matrix_is_an_error(box, count, operator):
     """K without a hold has six rigid motions, L three: pivots that vanish but for round-off."""
     mesh = box((0, 0, 0), (10, 12, 11), (count,) * 3)
     a = stiffness(mesh, 0.28) if operator == "K" else vectorised(laplacian(mesh))
-    with pytest.raises(CorrelationError, match="not positive definite.* use larger elements or a"):
+    with pytest.raises(CorrelationError, match=r"not positive definite.* use larger elements or"):
         factorise(a)
 
 
 def test_indefinite_matrix_is_an_error(mesh):
-    with pytest.raises(CorrelationError, match=r"the system of \d+ unknowns is not positive definite"):
+    with pytest.raises(CorrelationError, match=r"system of \d+ unknowns is not positive definite"):
         factorise(-1.0 * system(mesh))

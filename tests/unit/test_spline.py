@@ -76,7 +76,8 @@ def test_both_kernels_give_the_same_value(noise):
 
 def test_outside_begins_beyond_the_outermost_voxel_centres(noise):
     last = np.array(SHAPE) - 1.0
-    x = np.array([[0, 0, 0], last, [-1e-9, 5, 5], last + [0, 1e-9, 0], [np.nan, 5, 5]])
+    beyond = last * [1, 1 + 1e-9, 1]
+    x = np.array([[0, 0, 0], last, [-1e-9, 5, 5], beyond, [np.nan, 5, 5]])
     value, gradient, inside = spline_value_gradient(noise, x)
     assert_array_equal(inside, [True, True, False, False, False])
     assert_array_equal(spline_value(noise, x)[1], inside)

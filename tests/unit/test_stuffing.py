@@ -1,4 +1,4 @@
-"""Tetrahedra from the lattice: never inverted, never flat, closed, and the shape that was asked for."""
+"""Tetrahedra from the lattice: never inverted, never flat, closed, of the shape asked for."""
 
 import numpy as np
 import pytest

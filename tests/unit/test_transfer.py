@@ -59,7 +59,7 @@ def test_every_point_of_a_graded_mesh_is_found(rng):
     matrix, outside = transfer_matrix(mesh, x)
     assert outside == 0
     quadratic = np.sum(mesh.points**2, axis=1)
-    assert np.all(matrix @ quadratic >= np.sum(x**2, axis=1) - 1e-9)  # a chord lies above a parabola
+    assert np.all(matrix @ quadratic >= np.sum(x**2, axis=1) - 1e-9)  # chords of a parabola
 
 
 def test_from_a_lattice_an_affine_field_is_exact_even_outside(rng):

@@ -8,19 +8,19 @@ rule front_page:
     output:
         page=R + "/report/front.rst",
         config=R + "/report/config.json",
-    params:
-        code=code("report/front_page.py"),
-        config=config,
     log:
         R + "/logs/front_page/all.log",
     benchmark:
         R + "/benchmarks/front_page/all.tsv"
+    conda:
+        ENV
     threads: 1
     resources:
         mem_mb=memory(600),
         runtime=10,
-    conda:
-        ENV
+    params:
+        code=code("report/front_page.py"),
+        config=config,
     script:
         "../scripts/report/front_page.py"
 
@@ -39,20 +39,20 @@ rule report:
         config=R + "/report/config.json",
     output:
         R + "/report.html",
-    params:
-        code=code("report/report.py"),
-        snakefile=workflow.main_snakefile,
-        target="figures",
     log:
         R + "/logs/report/all.log",
     benchmark:
         R + "/benchmarks/report/all.tsv"
+    conda:
+        ENV
     threads: 1
     resources:
         mem_mb=memory(1500),
         runtime=20,
-    conda:
-        ENV
+    params:
+        code=code("report/report.py"),
+        snakefile=workflow.main_snakefile,
+        target="figures",
     script:
         "../scripts/report/report.py"
 
@@ -62,19 +62,19 @@ rule verdicts:
         R + "/summary.json",
     output:
         R + "/verdicts.txt",
-    params:
-        code=code("report/verdicts.py"),
-        folder=R,
-        strict=config["strict"],
     log:
         R + "/logs/verdicts/all.log",
     benchmark:
         R + "/benchmarks/verdicts/all.tsv"
+    conda:
+        ENV
     threads: 1
     resources:
         mem_mb=memory(600),
         runtime=10,
-    conda:
-        ENV
+    params:
+        code=code("report/verdicts.py"),
+        folder=R,
+        strict=config["strict"],
     script:
         "../scripts/report/verdicts.py"

@@ -12,7 +12,10 @@ with job(snakemake) as log:
     size = read_json(source.figures)["mean_edge"]
     options = meso_options(params.meso, size, params.axis, coarsest=True)
     system = meso_system(read_mesh(source.mesh), load_volume(source.reference)[0], options)
-    tried = {name: load_solution(path) for name, path in zip(params.names, source.candidates)}
+    tried = {
+        name: load_solution(path)
+        for name, path in zip(params.names, source.candidates, strict=True)
+    }
     starts = {name: solution.u for name, (solution, _) in tried.items()}
     best, solution, table = best_start(system, load_volume(source.deformed)[0], starts)
     for row in table:

@@ -17,5 +17,7 @@ with job(snakemake):
     system = meso_system(mesh, load_volume(source.reference)[0], options)
     into, outside = transfer_matrix(read_mesh(source.coarser), mesh.points)
     u = into @ load_solution(source.start)[0].u
-    solution = register(system, load_volume(source.deformed)[0], u, options.stop, snakemake.wildcards.meso)
+    solution = register(
+        system, load_volume(source.deformed)[0], u, options.stop, snakemake.wildcards.meso
+    )
     save_solution(snakemake.output[0], solution, nodes_outside_coarser=outside)

@@ -27,8 +27,10 @@ def case_kind(config: dict) -> str:
         raise ConfigError("`virtual` deforms a real scan: give scans.reference too")
     if "scans" not in config:
         if config.get("loading_axis", "y") != "y":
-            raise ConfigError(f"loading_axis is {config['loading_axis']}, but the twin is compressed "
-                              "along y: leave loading_axis out")  # fmt: skip
+            raise ConfigError(
+                f"loading_axis is {config['loading_axis']}, but the twin is compressed "
+                "along y: leave loading_axis out"
+            )
         return "twin"
     if "virtual" in config:
         if config["scans"].get("states"):
@@ -47,8 +49,10 @@ def state_strains(config: dict) -> list[float | None]:
 
 def state_labels(config: dict) -> dict[int, str]:
     """What figures call each state: its nominal strain, or its number."""
-    return {n: f"state {n}" if strain is None else f"{100 * strain:.1f} %"
-            for n, strain in enumerate(state_strains(config), start=1)}  # fmt: skip
+    return {
+        n: f"state {n}" if strain is None else f"{100 * strain:.1f} %"
+        for n, strain in enumerate(state_strains(config), start=1)
+    }
 
 
 def meso_names(config: dict) -> list[str]:
@@ -83,15 +87,23 @@ def scan_settings(config: dict, state: int) -> dict:
     kind = case_kind(config)
     if kind == "twin":
         factor = config["twin"]["bin"]
-        return {"format": {"axes": "zyx"}, "bin": factor, "crop": None,
-                "voxel_size_um": TWIN_VOXEL_UM / factor}  # fmt: skip
+        return {
+            "format": {"axes": "zyx"},
+            "bin": factor,
+            "crop": None,
+            "voxel_size_um": TWIN_VOXEL_UM / factor,
+        }
     scans = config["scans"]
     size = scans["voxel_size_um"]
     if kind == "virtual" and state > 0:
         return {"format": {"axes": "zyx"}, "bin": scans["bin"], "crop": None, "voxel_size_um": size}
     keys = ("axes", "shape", "dtype", "byte_order", "header_bytes", "dataset")
-    return {"format": {key: scans[key] for key in keys if key in scans}, "bin": scans["bin"],
-            "crop": scans["crop"], "voxel_size_um": size}  # fmt: skip
+    return {
+        "format": {key: scans[key] for key in keys if key in scans},
+        "bin": scans["bin"],
+        "crop": scans["crop"],
+        "voxel_size_um": size,
+    }
 
 
 def check_keys(config: dict, schema: dict, path: str = "") -> None:

@@ -43,8 +43,12 @@ def kind(spec: dict) -> str:
         return " or ".join(kind(option) for option in spec["anyOf"])
     name = spec.get("type", "any")
     name = " or ".join(name) if isinstance(name, list) else name
-    words = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to",
-             "exclusiveMaximum": "below"}  # fmt: skip
+    words = {
+        "minimum": "from",
+        "exclusiveMinimum": "above",
+        "maximum": "to",
+        "exclusiveMaximum": "below",
+    }
     bounds = [f"{word} {spec[limit]}" for limit, word in words.items() if limit in spec]
     if name == "array" and "enum" in spec.get("items", {}):
         return "list of " + kind(spec["items"])
@@ -55,7 +59,9 @@ def default(spec: dict) -> str:
     """The default of a key, as YAML has it."""
     if "default" not in spec:
         return "none"
-    return f"`{yaml.safe_dump(spec['default'], default_flow_style=True).replace('...', '').strip()}`"
+    return (
+        f"`{yaml.safe_dump(spec['default'], default_flow_style=True).replace('...', '').strip()}`"
+    )
 
 
 def page(schema: dict) -> str:
@@ -63,7 +69,9 @@ def page(schema: dict) -> str:
     plain = {key: spec for key, spec in schema["properties"].items() if "properties" not in spec}
     parts = {key: spec for key, spec in schema["properties"].items() if "properties" in spec}
     top = ["| key | value | default | meaning |", "|---|---|---|---|"]
-    return "\n".join([HEAD, *top, *rows({"properties": plain}), *rows({"properties": parts})]) + "\n"
+    return (
+        "\n".join([HEAD, *top, *rows({"properties": plain}), *rows({"properties": parts})]) + "\n"
+    )
 
 
 if __name__ == "__main__":

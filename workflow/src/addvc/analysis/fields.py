@@ -24,8 +24,11 @@ def result_fields(
         mean, square = (by_owner(values, owner, len(mesh.cells)) for values in (mean, square))
     tensor = strain(mesh, u)
     points = {"displacement": u, "valid": valid_nodes(mesh, square, noise).astype(np.uint8)}
-    cells = {"strain": tensor.reshape(-1, 9), "strain_norm": np.linalg.norm(tensor, axis=(1, 2)),
-             "residual": mean}  # fmt: skip
+    cells = {
+        "strain": tensor.reshape(-1, 9),
+        "strain_norm": np.linalg.norm(tensor, axis=(1, 2)),
+        "residual": mean,
+    }
     return points, cells
 
 

@@ -34,8 +34,9 @@ def load_residual(path: str | Path) -> dict:
     """What `save_residual` wrote."""
     with h5py.File(path) as file:
         arrays = {name: file[name][:] for name in ("r", "inside", "weight")}
-        return arrays | {"statistics": {key: np.asarray(value).item()
-                                        for key, value in file.attrs.items()}}  # fmt: skip
+        return arrays | {
+            "statistics": {key: np.asarray(value).item() for key, value in file.attrs.items()}
+        }
 
 
 def by_cell(values: np.ndarray, weight: np.ndarray, inside: np.ndarray, cells: int) -> np.ndarray:

@@ -13,12 +13,25 @@ from addvc.correlation.store import load_solution
 from addvc.fem.io import read_vtu
 from addvc.images.files import read_json
 
-PACKAGES = ("snakemake", "numpy", "scipy", "scikit-image", "scikit-sparse", "numba", "pytetwild",
-            "pymeshlab", "pymetis", "meshio", "pyvista", "matplotlib")  # fmt: skip
+PACKAGES = (
+    "snakemake",
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "scikit-sparse",
+    "numba",
+    "pytetwild",
+    "pymeshlab",
+    "pymetis",
+    "meshio",
+    "pyvista",
+    "matplotlib",
+)
 
 
-def summarise(case: str, folder: str | Path, meshes: list[str], states: dict[int, str],
-              finest: str, axis: int) -> dict:  # fmt: skip
+def summarise(
+    case: str, folder: str | Path, meshes: list[str], states: dict[int, str], finest: str, axis: int
+) -> dict:
     """The summary of results/CASE (`folder`): `meshes` from meso to micro, `states` with labels."""
     folder = Path(folder)
     read = lambda name: read_json(folder / name)  # noqa: E731
@@ -31,12 +44,14 @@ def summarise(case: str, folder: str | Path, meshes: list[str], states: dict[int
         "noise": threshold["noise"],
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
-        "states": [state_figures(folder, state, label, meshes, finest, axis)
-                   for state, label in states.items()],
+        "states": [
+            state_figures(folder, state, label, meshes, finest, axis)
+            for state, label in states.items()
+        ],
         "cost": costs(folder / "benchmarks"),
         "versions": {"addvc": __version__, "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
-    }  # fmt: skip
+    }
 
 
 def mesh_figures(folder: Path, mesh: str) -> dict:
@@ -47,13 +62,14 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
     return figures | {"ultimate_error": error["ultimate_error"]}
 
 
-def state_figures(folder: Path, state: int, label: str, meshes: list[str], finest: str,
-                  axis: int) -> dict:  # fmt: skip
+def state_figures(
+    folder: Path, state: int, label: str, meshes: list[str], finest: str, axis: int
+) -> dict:
     """Verdict, measured strain and the figures of each mesh for one state."""
-    micro = [mesh for mesh in meshes if mesh.startswith("micro")][0]
+    micro = next(mesh for mesh in meshes if mesh.startswith("micro"))
     result = {"state": state, "label": label}
     for mesh in meshes:
-        solution, notes = load_solution(folder / f"dvc/{mesh}_state{state}.h5")
+        solution, _ = load_solution(folder / f"dvc/{mesh}_state{state}.h5")
         errors = folder / f"analysis/error_{mesh}_state{state}.json"
         residual = read_json(folder / f"analysis/residual_{mesh}_state{state}.json")
         _, _, point, _ = read_vtu(folder / f"fields/{mesh}_state{state}.vtu")
@@ -70,11 +86,14 @@ def state_figures(folder: Path, state: int, label: str, meshes: list[str], fines
     points, _, point, _ = read_vtu(folder / f"fields/{finest}_state{state}.vtu")
     slope = np.polyfit(points[:, axis], point["displacement"][:, axis], 1)[0]
     best = result[micro]
-    start, notes = load_solution(folder / f"dvc/start_state{state}.h5")
-    return result | {"strain": float(-slope), "start": notes["best"],
-                     "candidates": notes["candidates"],
-                     "verdict": verdict(best["converged"], best["valid_nodes"]),
-                     "struts": None}  # fmt: skip
+    _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
+    return result | {
+        "strain": float(-slope),
+        "start": notes["best"],
+        "candidates": notes["candidates"],
+        "verdict": verdict(best["converged"], best["valid_nodes"]),
+        "struts": None,
+    }
 
 
 def costs(folder: Path) -> dict:

@@ -19,15 +19,21 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     With the tangents (n, 3) of the struts also the rms normal to and along the strut: a slip along
     a uniform strut cannot be seen in an image."""
     length = np.linalg.norm(error, axis=1)
-    result = {"count": len(error), "rms": float(np.sqrt(np.mean(length**2))),
-              "median": float(np.median(length)), "p95": float(np.percentile(length, 95)),
-              "within_1_voxel": float(np.mean(length < 1))}  # fmt: skip
+    result = {
+        "count": len(error),
+        "rms": float(np.sqrt(np.mean(length**2))),
+        "median": float(np.median(length)),
+        "p95": float(np.percentile(length, 95)),
+        "within_1_voxel": float(np.mean(length < 1)),
+    }
     if tangent is None:
         return result | {"rms_normal": None, "rms_along": None}
     along = np.einsum("ni,ni->n", error, tangent)
     normal = np.sqrt(np.maximum(length**2 - along**2, 0))
-    return result | {"rms_normal": float(np.sqrt(np.mean(normal**2))),
-                     "rms_along": float(np.sqrt(np.mean(along**2)))}  # fmt: skip
+    return result | {
+        "rms_normal": float(np.sqrt(np.mean(normal**2))),
+        "rms_along": float(np.sqrt(np.mean(along**2))),
+    }
 
 
 def error_at(truth: Truth | VirtualField, points: np.ndarray, u: np.ndarray, state: int) -> dict:

@@ -6,7 +6,7 @@ mesh by Eq. 6, 7; the better, by sigma(r) after a short correlation, is kept.
 """
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to
 
 log = logging.getLogger(__name__)
 
+START_VOXELS = 2e6  # a start is coarse: more voxels would take memory and give nothing
+
 
 @dataclass(frozen=True)
 class MesoOptions:
@@ -38,7 +40,7 @@ class MesoOptions:
     axis: int
     cutoff: float
     period: float
-    stop: Stop = Stop()
+    stop: Stop = field(default_factory=Stop)
 
 
 def meso_options(section: dict, size: float, axis: int, coarsest: bool) -> MesoOptions:
@@ -57,16 +59,27 @@ def start_options(section: dict, size: float, axis: int) -> MesoOptions:
     return MesoOptions(axis, size, 4 * size, Stop(1e-2, section["max_iterations"]))
 
 
-def meso_quadrature(mesh: Mesh, shape: tuple[int, int, int], lines=None) -> Quadrature:
-    """Voxel centres inside tetrahedra, or inside a grid given by its grid lines."""
-    return voxel_points(mesh, shape) if lines is None else lattice_points(lines, shape)
+def meso_quadrature(
+    mesh: Mesh, shape: tuple[int, int, int], lines: list | None = None, most: float = np.inf
+) -> Quadrature:
+    """Voxel centres inside tetrahedra, or inside a grid given by its grid lines.
+
+    One voxel in stride**3 where the image has more than `most`."""
+    stride = max(1, int(np.ceil((np.prod(shape) / most) ** (1 / 3))))
+    if lines is None:
+        return voxel_points(mesh, shape, stride)
+    return lattice_points(lines, shape, stride)
 
 
 def meso_system(
-    mesh: Mesh, coefficients: np.ndarray, options: MesoOptions, lines: list | None = None
+    mesh: Mesh,
+    coefficients: np.ndarray,
+    options: MesoOptions,
+    lines: list | None = None,
+    most: float = np.inf,
 ) -> System:
     """Eq. 9 with T = L on one mesh: I_r sampled at voxel centres, and A = H + M factorised."""
-    quadrature = meso_quadrature(mesh, coefficients.shape, lines)
+    quadrature = meso_quadrature(mesh, coefficients.shape, lines, most)
     reference = reference_on(mesh, quadrature, coefficients)
     h = hessian(reference, node_pattern(mesh))
     if options.cutoff == 0:
@@ -95,11 +108,17 @@ def pyramid_start(
         factor = 2**level
         small = Mesh(to_coarse(mesh.points, factor), mesh.cells)
         grid = None if lines is None else [to_coarse(line, factor) for line in lines]
-        scaled = MesoOptions(options.axis, options.cutoff / factor, options.period / factor,
-                             options.stop)  # fmt: skip
-        system = meso_system(small, references[level], scaled, grid)
-        solution = register(system, deformed[level], displacement_to_coarse(u, factor),
-                            options.stop, f"pyramid level {level}")  # fmt: skip
+        scaled = MesoOptions(
+            options.axis, options.cutoff / factor, options.period / factor, options.stop
+        )
+        system = meso_system(small, references[level], scaled, grid, START_VOXELS)
+        solution = register(
+            system,
+            deformed[level],
+            displacement_to_coarse(u, factor),
+            options.stop,
+            f"pyramid level {level}",
+        )
         u = displacement_to_fine(solution.u, factor)
     return u
 
@@ -126,8 +145,12 @@ def rescale(
         log.info("rescale refused: sigma(r) %.3f -> %.3f", before["std"], after["std"])
         return replace(solution, u=w, residual=before, converged=False), [1.0, 1.0, 1.0]
     factors = scale_factors(solution.u, w)
-    log.info("rescale: factors %s, sigma(r) %.3f -> %.3f", np.round(factors, 4),
-             before["std"], after["std"])  # fmt: skip
+    log.info(
+        "rescale: factors %s, sigma(r) %.3f -> %.3f",
+        np.round(factors, 4),
+        before["std"],
+        after["std"],
+    )
     return replace(solution, residual=after), factors
 
 
@@ -139,10 +162,20 @@ def best_start(
     for name, u in candidates.items():
         solution = register(system, deformed, u, Stop(1e-3, iterations), f"start {name}")
         tried[name] = solution
-        table.append({"candidate": name, "residual_std": solution.residual["std"],
-                      "outside": solution.residual["outside"],
-                      "iterations": solution.iterations})  # fmt: skip
+        table.append(
+            {
+                "candidate": name,
+                "residual_std": solution.residual["std"],
+                "outside": solution.residual["outside"],
+                "iterations": solution.iterations,
+            }
+        )
     usable = [row for row in table if np.isfinite(row["residual_std"])]
-    best = min(usable, key=lambda row: (row["outside"] > 0.2 * len(system.reference.quadrature),
-                                        row["residual_std"]))["candidate"]  # fmt: skip
+    best = min(
+        usable,
+        key=lambda row: (
+            row["outside"] > 0.2 * len(system.reference.quadrature),
+            row["residual_std"],
+        ),
+    )["candidate"]
     return best, tried[best], table

@@ -21,5 +21,8 @@ def reduced_solve(hessian: sparse.spmatrix, basis: np.ndarray):
 
 
 def scale_factors(u: np.ndarray, w: np.ndarray) -> list[float]:
-    """The three factors by which u (n, 3) = w scaled: the least squares ratio by component."""
-    return [float((u[:, d] @ w[:, d]) / max(w[:, d] @ w[:, d], 1e-300)) for d in range(3)]
+    """The three factors by which u (n, 3) = w scaled: the least squares ratio by component.
+
+    One for a component that is zero in w, which has no scale."""
+    size = [w[:, d] @ w[:, d] for d in range(3)]
+    return [float(u[:, d] @ w[:, d] / size[d]) if size[d] > 0 else 1.0 for d in range(3)]

@@ -51,14 +51,24 @@ def register(
         return b
 
     def progress(iteration, step):
-        log.info("%s: iteration %d, rms(du) %.2e voxel, sigma(r) %.3f before it",
-                 name, iteration, step, sigma["now"])  # fmt: skip
+        log.info(
+            "%s: iteration %d, rms(du) %.2e voxel, sigma(r) %.3f before it",
+            name,
+            iteration,
+            step,
+            sigma["now"],
+        )
 
-    solution = gauss_newton(downhill, system.factor.solve, u, stop.tolerance,
-                            stop.max_iterations, progress)  # fmt: skip
+    solution = gauss_newton(
+        downhill, system.factor.solve, u, stop.tolerance, stop.max_iterations, progress
+    )
     r, inside = residual(reference, deformed, solution.u)
     statistics = residual_statistics(r, inside, reference.quadrature.weight)
-    log.info("%s: %s after %d iterations, sigma(r) %.3f", name,
-             "converged" if solution.converged else "NOT converged", solution.iterations,
-             statistics["std"])  # fmt: skip
+    log.info(
+        "%s: %s after %d iterations, sigma(r) %.3f",
+        name,
+        "converged" if solution.converged else "NOT converged",
+        solution.iterations,
+        statistics["std"],
+    )
     return replace(solution, residual=statistics)

@@ -66,8 +66,10 @@ def equilibrium_gap(
     v = shear_wave(mesh.points, axis, period)
     trial = quadratic(hessian, v)
     matrix, weights = sparse.csr_matrix(hessian.shape), {"S_v": trial}
-    terms = (("c1", stiffness(mesh, nu), ~penalised, l_k),
-             ("c2", vectorised(laplacian(mesh)), penalised, l_l))  # fmt: skip
+    terms = (
+        ("c1", stiffness(mesh, nu), ~penalised, l_k),
+        ("c2", vectorised(laplacian(mesh)), penalised, l_l),
+    )
     for name, operator, selected, cutoff in terms:
         if not selected.any():
             weights[name] = 0.0

@@ -27,9 +27,13 @@ def save_solution(path: str | Path, solution: Solution, **notes) -> None:
 def load_solution(path: str | Path) -> tuple[Solution, dict]:
     """A solution and its notes."""
     with h5py.File(path) as file:
-        solution = Solution(file["u"][:], file["history"][:].tolist(),
-                            bool(file.attrs["converged"]), float(file.attrs["seconds"]),
-                            json.loads(file.attrs["residual"]))  # fmt: skip
+        solution = Solution(
+            file["u"][:],
+            file["history"][:].tolist(),
+            bool(file.attrs["converged"]),
+            float(file.attrs["seconds"]),
+            json.loads(file.attrs["residual"]),
+        )
         return solution, json.loads(file.attrs["notes"])
 
 
@@ -47,13 +51,18 @@ def load_field(path: str | Path) -> np.ndarray:
         return file["u"][:]
 
 
-def save_factor(path: str | Path, factor: Factor, regularisation: sparse.csr_matrix, weights: dict) -> None:  # fmt: skip
+def save_factor(
+    path: str | Path, factor: Factor, regularisation: sparse.csr_matrix, weights: dict
+) -> None:
     """The factor of A = H + M with M itself, and the weights of its terms."""
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         for name, matrix in (("L", factor.lower), ("M", regularisation)):
             group = file.create_group(name)
             group["data"], group["indices"], group["indptr"] = (
-                matrix.data, matrix.indices, matrix.indptr)  # fmt: skip
+                matrix.data,
+                matrix.indices,
+                matrix.indptr,
+            )
             group.attrs["shape"] = matrix.shape
         file["order"] = factor.order
         file.attrs["weights"] = json.dumps(weights)
@@ -62,10 +71,11 @@ def save_factor(path: str | Path, factor: Factor, regularisation: sparse.csr_mat
 def load_factor(path: str | Path) -> tuple[Factor, sparse.csr_matrix, dict]:
     """What `save_factor` wrote."""
     with h5py.File(path) as file:
-        parts = {name: (file[name]["data"][:], file[name]["indices"][:], file[name]["indptr"][:])
-                 for name in ("L", "M")}  # fmt: skip
+        parts = {
+            name: (file[name]["data"][:], file[name]["indices"][:], file[name]["indptr"][:])
+            for name in ("L", "M")
+        }
         shape = tuple(file["L"].attrs["shape"])
         lower = sparse.csc_matrix(parts["L"], shape=shape)
         factor = Factor(lower, file["order"][:])
-        return factor, sparse.csr_matrix(parts["M"], shape=shape), json.loads(
-            file.attrs["weights"])  # fmt: skip
+        return factor, sparse.csr_matrix(parts["M"], shape=shape), json.loads(file.attrs["weights"])

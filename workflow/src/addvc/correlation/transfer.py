@@ -17,22 +17,27 @@ CANDIDATES = 24
 
 def locate(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedron (Q,) of each point (Q, 3), and its barycentric coordinates (Q, 4)."""
-    tree = cKDTree(mesh.points[mesh.cells].mean(axis=1))
-    count = min(CANDIDATES, len(mesh.cells))
-    _, near = tree.query(points, k=count)
-    near = near.reshape(len(points), count)
-    cell = near[:, 0].copy()
+    corner = mesh.points[mesh.cells]
+    centre = corner.mean(axis=1)
+    reach = np.linalg.norm(corner - centre[:, None], axis=2).max()  # no cell is larger
+    tree = cKDTree(centre)
+    cell = tree.query(points)[1]
     shape = barycentric(mesh, cell, points)
     best = shape.min(axis=1)
-    for candidate in near.T[1:]:
-        todo = np.flatnonzero(best < -1e-9)
-        if len(todo) == 0:
-            break
-        trial = barycentric(mesh, candidate[todo], points[todo])
-        better = trial.min(axis=1) > best[todo]
-        rows = todo[better]
-        cell[rows], shape[rows] = candidate[rows], trial[better]
-        best[rows] = trial[better].min(axis=1)
+    todo, count = np.flatnonzero(best < -1e-9), CANDIDATES
+    while len(todo):
+        count = min(count, len(centre))
+        away, near = tree.query(points[todo], k=count)
+        away, near = away.reshape(len(todo), count), near.reshape(len(todo), count)
+        for column in near.T:
+            rows = np.flatnonzero(best[todo] < -1e-9)
+            trial = barycentric(mesh, column[rows], points[todo[rows]])
+            better = trial.min(axis=1) > best[todo[rows]]
+            at, rows = todo[rows[better]], rows[better]
+            cell[at], shape[at], best[at] = column[rows], trial[better], trial[better].min(axis=1)
+        farther = (away[:, -1] < reach) & (count < len(centre))
+        todo = todo[(best[todo] < -1e-9) & farther]
+        count *= 4
     return cell, shape
 
 

@@ -23,17 +23,23 @@ def fft_shift(volume: np.ndarray, shift: Sequence[float]) -> np.ndarray:
     return np.ascontiguousarray(fft.irfftn(spectrum, volume.shape, workers=-1), dtype=np.float32)
 
 
-def ultimate_error(system: System, coefficients: np.ndarray, shifts: Sequence[float],
-                   stop: Stop) -> dict:  # fmt: skip
+def ultimate_error(
+    system: System, coefficients: np.ndarray, shifts: Sequence[float], stop: Stop
+) -> dict:
     """Error of a rigid shift (s, s, s), for each s: bias and standard deviation over nodes.
 
     `ultimate_error` is the standard deviation of a component over nodes, the mean over shifts."""
     rows = []
     for shift in shifts:
         moved = fft_shift(coefficients, [shift] * 3)
-        u = register(system, moved, np.zeros_like(system.reference.mesh.points), stop,
-                     f"shift {shift}").u  # fmt: skip
-        rows.append({"shift": shift, "bias": float((u - shift).mean()),
-                     "std": float((u - shift).std())})  # fmt: skip
-    return {"ultimate_error": float(np.mean([row["std"] for row in rows])), "unit": "voxel",
-            "shifts": rows}  # fmt: skip
+        u = register(
+            system, moved, np.zeros_like(system.reference.mesh.points), stop, f"shift {shift}"
+        ).u
+        rows.append(
+            {"shift": shift, "bias": float((u - shift).mean()), "std": float((u - shift).std())}
+        )
+    return {
+        "ultimate_error": float(np.mean([row["std"] for row in rows])),
+        "unit": "voxel",
+        "shifts": rows,
+    }

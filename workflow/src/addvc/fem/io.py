@@ -11,12 +11,21 @@ from addvc.images.files import atomic_path
 KINDS = {3: "triangle", 4: "tetra", 8: "hexahedron"}
 
 
-def write_vtu(path: str | Path, points: np.ndarray, cells: np.ndarray,
-              point_data: dict | None = None, cell_data: dict | None = None) -> None:  # fmt: skip
+def write_vtu(
+    path: str | Path,
+    points: np.ndarray,
+    cells: np.ndarray,
+    point_data: dict | None = None,
+    cell_data: dict | None = None,
+) -> None:
     """Points (n, 3), cells (m, 3 | 4 | 8), fields by name: (n, ...) on points, (m, ...) on cells."""
     kind = KINDS[cells.shape[1]]
-    grid = meshio.Mesh(np.asarray(points), [(kind, np.asarray(cells))], point_data or {},
-                       {name: [value] for name, value in (cell_data or {}).items()})  # fmt: skip
+    grid = meshio.Mesh(
+        np.asarray(points),
+        [(kind, np.asarray(cells))],
+        point_data or {},
+        {name: [value] for name, value in (cell_data or {}).items()},
+    )
     with atomic_path(path) as temporary:
         grid.write(temporary, file_format="vtu", binary=True)
 
@@ -28,8 +37,9 @@ def read_vtu(path: str | Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
     return grid.points, grid.cells[0].data, dict(grid.point_data), cell_data
 
 
-def write_mesh(path: str | Path, mesh: Mesh, point_data: dict | None = None,
-               cell_data: dict | None = None) -> None:  # fmt: skip
+def write_mesh(
+    path: str | Path, mesh: Mesh, point_data: dict | None = None, cell_data: dict | None = None
+) -> None:
     """A mesh and its fields."""
     write_vtu(path, mesh.points, mesh.cells, point_data, cell_data)
 

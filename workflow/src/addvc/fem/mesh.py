@@ -73,8 +73,9 @@ def boundary_faces(mesh: Mesh) -> np.ndarray:
     """Faces that belong to one cell only, (f, 3) or (f, 4), wound outwards."""
     table = TET_FACES if mesh.is_tet else HEX_FACES
     faces = mesh.cells[:, table].reshape(-1, table.shape[1])
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True,
-                                return_counts=True)  # fmt: skip
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
     return faces[np.sort(first[count == 1])]
 
 
@@ -110,14 +111,20 @@ def check_mesh(mesh: Mesh, name: str, min_dihedral: float = 0.0) -> dict:
             f"{name}: {(volume <= 0).sum()} of {len(volume)} cells are inverted or flat (smallest "
             f"volume {volume.min():.2e} voxel^3, must be above 0); change mesh.edge_length"
         )
-    report = {"nodes": len(mesh.points), "cells": len(mesh.cells), "volume": float(volume.sum()),
-              "mean_volume": float(volume.mean())}  # fmt: skip
+    report = {
+        "nodes": len(mesh.points),
+        "cells": len(mesh.cells),
+        "volume": float(volume.sum()),
+        "mean_volume": float(volume.mean()),
+    }
     if not mesh.is_tet:
         return report
     loose = int(face_components(mesh).max())
     if loose:
-        raise MeshError(f"{name}: {loose} pieces are not attached by a face to the largest one "
-                        "(limit 0); keep the largest component only")  # fmt: skip
+        raise MeshError(
+            f"{name}: {loose} pieces are not attached by a face to the largest one "
+            "(limit 0); keep the largest component only"
+        )
     smallest, largest = dihedral_range(mesh)
     if smallest.min() < min_dihedral:
         raise MeshError(
@@ -125,10 +132,13 @@ def check_mesh(mesh: Mesh, name: str, min_dihedral: float = 0.0) -> dict:
             f"angle below {min_dihedral} degrees (smallest {smallest.min():.2g}); change "
             "mesh.edge_length or lower mesh.min_dihedral"
         )
-    return report | {"components": 1, "mean_edge": mean_edge_length(mesh),
-                     "min_dihedral": float(smallest.min()),
-                     "min_dihedral_p01": float(np.percentile(smallest, 1)),
-                     "max_dihedral": float(largest.max())}  # fmt: skip
+    return report | {
+        "components": 1,
+        "mean_edge": mean_edge_length(mesh),
+        "min_dihedral": float(smallest.min()),
+        "min_dihedral_p01": float(np.percentile(smallest, 1)),
+        "max_dihedral": float(largest.max()),
+    }
 
 
 def oriented(mesh: Mesh) -> Mesh:

@@ -37,27 +37,34 @@ def gauss_points(mesh: Mesh, per_tet: int = 4) -> Quadrature:
     return Quadrature(cell, np.tile(shape, (len(mesh.cells), 1)), points, weight)
 
 
-def voxel_points(mesh: Mesh, image_shape: tuple[int, int, int]) -> Quadrature:
+def voxel_points(mesh: Mesh, image_shape: tuple[int, int, int], stride: int = 1) -> Quadrature:
     """Centres of the voxels inside a tetrahedral mesh, each owned by one cell, weight 1.
 
-    Raises MeshError when no voxel is inside."""
+    With a `stride` one voxel in stride**3 is kept and weighs as much. Raises MeshError when no
+    voxel is inside."""
     owner = voxel_owner(mesh.points, mesh.cells, np.asarray(image_shape, dtype=np.int64))
-    index = np.flatnonzero(owner.ravel() >= 0)
+    kept = (slice(None, None, stride),) * 3
+    index = np.flatnonzero(owner[kept].ravel() >= 0)
     if len(index) == 0:
-        raise MeshError(f"no voxel of the image {tuple(image_shape)} is inside the mesh, which "
-                        f"spans {mesh.points.min(0)} to {mesh.points.max(0)}; check the units")  # fmt: skip
-    cell = owner.ravel()[index]
-    points = np.column_stack(np.unravel_index(index, image_shape)).astype(np.float64)
+        raise MeshError(
+            f"no voxel of the image {tuple(image_shape)} is inside the mesh, which "
+            f"spans {mesh.points.min(0)} to {mesh.points.max(0)}; check the units"
+        )
+    cell = owner[kept].ravel()[index]
+    place = np.unravel_index(index, owner[kept].shape)
+    points = stride * np.column_stack(place).astype(np.float64)
     shape = barycentric(mesh, cell, points)
-    return Quadrature(cell, shape, points, np.ones(len(index)))
+    return Quadrature(cell, shape, points, np.full(len(index), float(stride**3)))
 
 
 def barycentric(mesh: Mesh, cell: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Eq. A1: N (Q, 4) at points (Q, 3) of the given tetrahedra (Q,); negative when outside."""
-    origin = mesh.points[mesh.cells[:, 0]]
-    edges = mesh.points[mesh.cells[:, 1:]] - origin[:, None]
+    few = len(cell) < len(mesh.cells)  # then invert for each point, not for each cell
+    cells, row = (mesh.cells[cell], slice(None)) if few else (mesh.cells, cell)
+    origin = mesh.points[cells[:, 0]]
+    edges = mesh.points[cells[:, 1:]] - origin[:, None]
     inverse = np.linalg.inv(edges)  # rows: x = xi @ edges
-    xi = np.einsum("qi,qij->qj", points - origin[cell], inverse[cell])
+    xi = np.einsum("qi,qij->qj", points - origin[row], inverse[row])
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 
@@ -106,13 +113,17 @@ def locate_in_lattice(lines: list[np.ndarray], points: np.ndarray) -> tuple[np.n
     return cell.astype(np.int32), hex_q1(local)[0]
 
 
-def lattice_points(lines: list[np.ndarray], image_shape: tuple[int, int, int]) -> Quadrature:
-    """Voxel centres inside a rectilinear hexahedral grid, weight 1."""
-    spans = [np.arange(max(0, int(np.ceil(line[0]))), min(size - 1, int(line[-1])) + 1.0)
-             for line, size in zip(lines, image_shape, strict=True)]  # fmt: skip
+def lattice_points(
+    lines: list[np.ndarray], image_shape: tuple[int, int, int], stride: int = 1
+) -> Quadrature:
+    """Voxel centres inside a rectilinear hexahedral grid, weights as in `voxel_points`."""
+    spans = [
+        np.arange(max(0, int(np.ceil(line[0]))), min(size - 1, int(line[-1])) + 1.0, stride)
+        for line, size in zip(lines, image_shape, strict=True)
+    ]
     points = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, 3)
     cell, shape = locate_in_lattice(lines, points)
-    return Quadrature(cell, shape, points, np.ones(len(points)))
+    return Quadrature(cell, shape, points, np.full(len(points), float(stride**3)))
 
 
 @nb.njit(parallel=True, cache=True)

@@ -17,6 +17,8 @@ from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
 
 from addvc.errors import CorrelationError
 
+LEAST_PIVOT = 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class Factor:
@@ -32,8 +34,12 @@ class Factor:
     def solve(self, b: np.ndarray) -> np.ndarray:
         """x (N,) of A x = b (N,)."""
         x = np.empty(len(b))
-        x[self.order] = triangular_solves(self.lower.data, self.lower.indices, self.lower.indptr,
-                                          np.asarray(b, dtype=float)[self.order])  # fmt: skip
+        x[self.order] = triangular_solves(
+            self.lower.data,
+            self.lower.indices,
+            self.lower.indptr,
+            np.asarray(b, dtype=float)[self.order],
+        )
         return x
 
 
@@ -57,14 +63,17 @@ def triangular_solves(data, indices, indptr, b):
 def dissection(matrix: sparse.spmatrix, block: int = 3) -> np.ndarray:
     """Order of elimination (N,) by nested dissection of the graph of block x block entries."""
     nodes = sparse.bsr_matrix(matrix, blocksize=(block, block))
-    graph = sparse.csr_matrix((np.ones(len(nodes.indices), dtype=np.int8), nodes.indices,
-                               nodes.indptr), shape=(matrix.shape[0] // block,) * 2,
-                              copy=True)  # the next lines work in place  # fmt: skip
+    graph = sparse.csr_matrix(
+        (np.ones(len(nodes.indices), dtype=np.int8), nodes.indices, nodes.indptr),
+        shape=(matrix.shape[0] // block,) * 2,
+        copy=True,
+    )  # the next lines work in place
     graph.setdiag(0)
     graph.eliminate_zeros()
     if graph.nnz == 0:
         return np.arange(matrix.shape[0])
-    order, _ = pymetis.nested_dissection(xadj=graph.indptr, adjncy=graph.indices)
+    neighbours = pymetis.CSRAdjacency(graph.indptr, graph.indices)
+    order, _ = pymetis.nested_dissection(adjacency=neighbours)
     return (block * np.asarray(order)[:, None] + np.arange(block)).ravel()
 
 
@@ -76,13 +85,15 @@ def factorise(matrix: sparse.spmatrix, order: np.ndarray | None = None) -> Facto
     order = dissection(matrix) if order is None else order
     permuted = matrix.tocsc()[order][:, order]
     try:
-        factor = cholesky(permuted, ordering_method="natural", mode="auto")
+        lower = cholesky(permuted, ordering_method="natural", mode="auto").L()
+        pivot = float(np.min(lower.diagonal() ** 2 / permuted.diagonal()))
+        if not pivot > LEAST_PIVOT:
+            raise CholmodNotPositiveDefiniteError(f"a pivot fell to {pivot:.1e} of its diagonal")
     except CholmodNotPositiveDefiniteError as error:
         raise CorrelationError(
             f"the system of {matrix.shape[0]} unknowns is not positive definite ({error}): some "
             "nodes are held neither by grey levels nor by regularisation; use larger elements or a "
             "longer regularisation length"
         ) from error
-    lower = factor.L()
     lower.sort_indices()
     return Factor(lower, order)

@@ -7,6 +7,7 @@ from addvc.errors import GeometryError
 
 LARGEST_BOX = 200  # voxels: a larger one says nothing more, and its FFT would take gigabytes
 PLATEN_MARGIN = 3.0
+REACH = 0.6  # of the smallest side: longer shifts have few pairs of voxels
 
 
 def central_box(specimen, shape: tuple[int, int, int]) -> tuple[slice, slice, slice]:
@@ -26,24 +27,27 @@ def central_box(specimen, shape: tuple[int, int, int]) -> tuple[slice, slice, sl
 
 
 def autocorrelation(grey: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Normalised autocorrelation of a box (nx, ny, nz) inside a mask, for shifts 0 .. n-1.
+    """Normalised autocorrelation of a box (nx, ny, nz) inside a mask, without wrap-around.
 
-    Each shift is divided by the number of voxel pairs that have it (nan for none); one at zero."""
+    The result (sx, sy, sz) has shift k at index k, negative ones from the end. Each is divided by
+    the number of voxel pairs that have it (nan for none); the value at zero is one."""
     size = [fft.next_fast_len(2 * n) for n in grey.shape]
     centred = np.where(mask, grey - grey[mask].mean(dtype=np.float64), 0).astype(np.float32)
-    sums = [fft.irfftn(np.abs(fft.rfftn(part, size)) ** 2, size)[tuple(map(slice, grey.shape))]
-            for part in (centred, mask.astype(np.float32))]  # fmt: skip
-    pairs = np.where(sums[1] > 0.5, sums[1], np.nan)
-    value = sums[0] / pairs
+    products, pairs = (
+        fft.irfftn(np.abs(fft.rfftn(part, size)) ** 2, size)
+        for part in (centred, mask.astype(np.float32))
+    )
+    value = products / np.where(pairs > 0.5, pairs, np.nan)
     return value / value[0, 0, 0]
 
 
-def radial_average(correlation: np.ndarray, share: float = 0.6) -> tuple[np.ndarray, np.ndarray]:
-    """Radii (voxels, one a voxel, up to `share` of the smallest side) and the mean around them."""
-    reach = int(share * min(correlation.shape))
-    part = correlation[:reach, :reach, :reach]
-    grid = np.arange(reach, dtype=np.float32) ** 2
-    radius = np.rint(np.sqrt(grid[:, None, None] + grid[:, None] + grid)).astype(int)
+def radial_average(correlation: np.ndarray, reach: int) -> tuple[np.ndarray, np.ndarray]:
+    """Radii 0 .. reach - 1 (voxels) and the mean of an autocorrelation over all directions."""
+    lags = [np.minimum(np.arange(n), n - np.arange(n)) for n in correlation.shape]
+    near = np.ix_(*(lag < reach for lag in lags))
+    x, y, z = (lag[lag < reach].astype(np.float32) ** 2 for lag in lags)
+    radius = np.rint(np.sqrt(x[:, None, None] + y[:, None] + z)).astype(int)
+    part = correlation[near]
     known = np.isfinite(part)
     total = np.bincount(radius[known], weights=part[known])[:reach]
     return np.arange(reach), total / np.bincount(radius[known])[:reach]
@@ -74,8 +78,14 @@ def measure_cell_size(volume: np.ndarray, specimen, setting: str | float) -> dic
     Raises GeometryError when it must be measured and there is no secondary peak."""
     box = central_box(specimen, volume.shape)
     mask = specimen.voxel_mask(volume.shape)[box]
-    radius, curve = radial_average(autocorrelation(volume[box], mask))
+    reach = int(REACH * min(mask.shape))
+    radius, curve = radial_average(autocorrelation(volume[box], mask), reach)
     size = secondary_peak(radius, curve) if setting == "auto" else float(setting)
     source = "measured" if setting == "auto" else "config"
-    return {"cell_size": size, "source": source, "radius": radius, "correlation": curve,
-            "unit": "voxel"}  # fmt: skip
+    return {
+        "cell_size": size,
+        "source": source,
+        "radius": radius,
+        "correlation": curve,
+        "unit": "voxel",
+    }

@@ -16,11 +16,13 @@ def grid_lines(
     low, high = max(specimen.low, 0.0), min(specimen.high, last)
     lines = [np.linspace(0.0, n - 1.0, across + 1) for n in shape]
     below, above = max(0.0, low - platen), min(last, high + platen)
-    lines[specimen.axis] = np.concatenate([
-        [below] if low - below >= 4 else [],
-        np.linspace(low, high, along + 1),
-        [above] if above - high >= 4 else [],
-    ])  # fmt: skip
+    lines[specimen.axis] = np.concatenate(
+        [
+            [below] if low - below >= 4 else [],
+            np.linspace(low, high, along + 1),
+            [above] if above - high >= 4 else [],
+        ]
+    )
     return lines
 
 
@@ -28,7 +30,17 @@ def hex_grid(lines: list[np.ndarray]) -> Mesh:
     """Hexahedra between three sets of grid lines, numbered with the last axis fastest."""
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape([len(line) for line in lines])
-    corner = [number[i : i - 1 or None, j : j - 1 or None, k : k - 1 or None].ravel()
-              for i, j, k in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0),
-                              (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))]  # fmt: skip
+    corner = [
+        number[i : i - 1 or None, j : j - 1 or None, k : k - 1 or None].ravel()
+        for i, j, k in (
+            (0, 0, 0),
+            (1, 0, 0),
+            (1, 1, 0),
+            (0, 1, 0),
+            (0, 0, 1),
+            (1, 0, 1),
+            (1, 1, 1),
+            (0, 1, 1),
+        )
+    ]
     return Mesh(points, np.column_stack(corner))

@@ -15,9 +15,13 @@ def specimen_surface(specimen, size: float) -> Surface:
         centre = np.insert(np.array(specimen.centre, dtype=float), specimen.axis, middle)
         around = max(8, round(2 * np.pi * specimen.radius / size))
         turn = 2 * np.pi / around
-        solid = pv.Cylinder(center=centre, direction=np.eye(3)[specimen.axis],
-                            radius=specimen.radius * np.sqrt(turn / np.sin(turn)),  # same area
-                            height=specimen.high - specimen.low, resolution=around)  # fmt: skip
+        solid = pv.Cylinder(
+            center=centre,
+            direction=np.eye(3)[specimen.axis],
+            radius=specimen.radius * np.sqrt(turn / np.sin(turn)),  # same area
+            height=specimen.high - specimen.low,
+            resolution=around,
+        )
     else:
         bounds = np.empty((3, 2))
         bounds[specimen.axis] = specimen.low, specimen.high

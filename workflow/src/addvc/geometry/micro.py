@@ -14,7 +14,9 @@ from addvc.geometry.tets import TetOptions, largest_piece, tetrahedralise
 log = logging.getLogger(__name__)
 
 
-def micro_mesh(grey: np.ndarray, gamma: float, surface: Surface, options: dict) -> tuple[Mesh, dict]:  # fmt: skip
+def micro_mesh(
+    grey: np.ndarray, gamma: float, surface: Surface, options: dict
+) -> tuple[Mesh, dict]:
     """Tetrahedra of {grey > gamma} in one piece, and the figures of the mesh.
 
     `options` is the `mesh` section of the configuration. Raises MeshError when the largest piece
@@ -26,12 +28,16 @@ def micro_mesh(grey: np.ndarray, gamma: float, surface: Surface, options: dict) 
         mesh = stuff(grey, gamma, options["size"])
     whole = np.abs(cell_volumes(mesh)).sum() if len(mesh.cells) else 0.0
     if whole == 0:
-        raise MeshError(f"no tetrahedron at mesh.size {options['size']}: struts are thinner than it; "
-                        "lower mesh.size")  # fmt: skip
+        raise MeshError(
+            f"no tetrahedron at mesh.size {options['size']}: struts are thinner than it; "
+            "lower mesh.size"
+        )
     mesh, pieces = largest_piece(mesh)
     figures = check_mesh(mesh, "micro mesh", options["min_dihedral"]) | pieces
-    figures |= {"kept_fraction": figures["volume"] / whole,
-                "volume_over_surface": figures["volume"] / enclosed_volume(surface)}  # fmt: skip
+    figures |= {
+        "kept_fraction": figures["volume"] / whole,
+        "volume_over_surface": figures["volume"] / enclosed_volume(surface),
+    }
     figures |= surface_distance(mesh, surface)
     report(figures, options)
     return mesh, figures
@@ -41,20 +47,32 @@ def surface_distance(mesh: Mesh, surface: Surface) -> dict:
     """Distance of the surface's vertices to the nearest node of the mesh's boundary, voxels."""
     nodes = mesh.points[np.unique(boundary_faces(mesh))]
     away, _ = cKDTree(nodes).query(surface.points)
-    return {"surface_distance_p95": float(np.percentile(away, 95)),
-            "surface_distance_max": float(away.max())}  # fmt: skip
+    return {
+        "surface_distance_p95": float(np.percentile(away, 95)),
+        "surface_distance_max": float(away.max()),
+    }
 
 
 def report(figures: dict, options: dict) -> None:
     """Say what was made; warn when over 10 % fell out, MeshError when too much did."""
     kept = figures["kept_fraction"]
-    log.info("%d tets, %d nodes, mean volume %.3f voxel^3, least dihedral angle %.1f degrees, "
-             "%.1f %% kept", figures["cells"], figures["nodes"], figures["mean_volume"],
-             figures["min_dihedral"], 100 * kept)  # fmt: skip
+    log.info(
+        "%d tets, %d nodes, mean volume %.3f voxel^3, least dihedral angle %.1f degrees, "
+        "%.1f %% kept",
+        figures["cells"],
+        figures["nodes"],
+        figures["mean_volume"],
+        figures["min_dihedral"],
+        100 * kept,
+    )
     if kept < options["min_kept"]:
-        raise MeshError(f"the largest of {figures['pieces']} pieces holds {kept:.1%} of the mesh (at "
-                        f"least {options['min_kept']:.0%}, mesh.min_kept): struts are thinner than "
-                        "the mesh; lower mesh.size")  # fmt: skip
+        raise MeshError(
+            f"the largest of {figures['pieces']} pieces holds {kept:.1%} of the mesh (at "
+            f"least {options['min_kept']:.0%}, mesh.min_kept): struts are thinner than "
+            "the mesh; lower mesh.size"
+        )
     if kept < 0.9:
-        log.warning("WARNING: %.0f %% of the mesh is in smaller pieces and falls out; lower mesh.size",
-                    100 * (1 - kept))  # fmt: skip
+        log.warning(
+            "WARNING: %.0f %% of the mesh is in smaller pieces and falls out; lower mesh.size",
+            100 * (1 - kept),
+        )

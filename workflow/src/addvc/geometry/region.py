@@ -44,8 +44,9 @@ def micro_region(specimen, setting, margin: float = 3.0) -> Region:
             bounds.append(((a + b) / 2 - half, (a + b) / 2 + half))
         return Region(specimen.axis, low, high, bounds=tuple(bounds), cut_sides=True)
     radius = wanted.get("radius", specimen.radius + margin)
-    return Region(specimen.axis, low, high, tuple(specimen.centre), radius,
-                  cut_sides=radius < specimen.radius)  # fmt: skip
+    return Region(
+        specimen.axis, low, high, tuple(specimen.centre), radius, cut_sides=radius < specimen.radius
+    )
 
 
 def caps_depth(region: Region, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -28,7 +28,8 @@ def stuff(grey: np.ndarray, gamma: float, spacing: float, neck: float = 0.65) ->
 
     The grey level between voxels is the cubic spline through them. A strut thinner than the
     lattice would fall between its points: along the skeleton of the solid the radius is at least
-    `neck` x spacing. Cells may be in several pieces; their mean volume is about spacing**3 / 14."""
+    `neck` x spacing, which keeps rods of radius 1 whole up to a spacing of 1.2.
+    Cells may be in several pieces; their mean volume is about spacing**3 / 14."""
     field = _Field(grey, gamma, neck * spacing)
     points, cells = _lattice(grey.shape, spacing)
     value = field(points)
@@ -54,11 +55,19 @@ class _Field:
     def __init__(self, grey, gamma, neck):
         self.coefficients = ndimage.spline_filter(grey - np.float32(gamma), 3, np.float32, "mirror")
         self.neck, self.slope = neck, float(grey.max() - gamma) / 2
-        self.skeleton = cKDTree(skeleton_points(grey > gamma)) if neck > 0 else None
+        thin = neck > 0 and self.slope > 0
+        self.skeleton = cKDTree(skeleton_points(grey > gamma)) if thin else None
 
     def __call__(self, points):
-        value = ndimage.map_coordinates(self.coefficients, points.T, order=3, prefilter=False,
-                                        output=np.float32, mode="constant", cval=-1.0)  # fmt: skip
+        value = ndimage.map_coordinates(
+            self.coefficients,
+            points.T,
+            order=3,
+            prefilter=False,
+            output=np.float32,
+            mode="constant",
+            cval=-1.0,
+        )
         if self.skeleton is not None:
             low = np.flatnonzero(value < self.slope * self.neck)
             away, _ = self.skeleton.query(points[low], distance_upper_bound=2 * self.neck)
@@ -156,7 +165,7 @@ def _clip(cells, sign, crossing, first):
     out += _prism((a, cut(a, m), cut(a, n)), (b, cut(b, m), cut(b, n)))
     a, b, c, m = cells[(plus == 3) & (minus == 1)].T
     out += _prism((a, b, c), (cut(a, m), cut(b, m), cut(c, m)))
-    return np.vstack([part for part in out if len(part)])
+    return np.vstack(out)
 
 
 def _prism(low, high):

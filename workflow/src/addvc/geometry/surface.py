@@ -48,13 +48,18 @@ def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]
     Raises GeometryError when there is no solid."""
     label, count = ndimage.label(grey > gamma)
     if count == 0:
-        raise GeometryError(f"no voxel of the region is above the threshold {gamma:.1f}; widen "
-                            "micro.region, or lower the threshold")  # fmt: skip
+        raise GeometryError(
+            f"no voxel of the region is above the threshold {gamma:.1f}; widen "
+            "micro.region, or lower the threshold"
+        )
     size = np.bincount(label.ravel())[1:]
     largest = int(np.argmax(size)) + 1
     kept = np.where((label == 0) | (label == largest), grey, np.float32(gamma - 1e-3))
-    return kept, {"components": int(count), "kept_fraction": float(size.max() / size.sum()),
-                  "dropped_voxels": int(size.sum() - size.max())}  # fmt: skip
+    return kept, {
+        "components": int(count),
+        "kept_fraction": float(size.max() / size.sum()),
+        "dropped_voxels": int(size.sum() - size.max()),
+    }
 
 
 def region_solid(
@@ -68,12 +73,17 @@ def region_solid(
     kept = figures["kept_fraction"]
     advice = "lower geometry.threshold or porosity, or lower images.blur"
     if kept < min_kept:
-        raise GeometryError(f"the largest of {figures['components']} pieces holds {kept:.1%} of the "
-                            f"solid (at least {min_kept:.0%}, mesh.min_kept): struts are broken; "
-                            f"{advice}")  # fmt: skip
+        raise GeometryError(
+            f"the largest of {figures['components']} pieces holds {kept:.1%} of the "
+            f"solid (at least {min_kept:.0%}, mesh.min_kept): struts are broken; "
+            f"{advice}"
+        )
     if kept < 0.9:
-        log.warning("WARNING: %.0f %% of the solid is in smaller pieces and falls out; %s",
-                    100 * (1 - kept), advice)  # fmt: skip
+        log.warning(
+            "WARNING: %.0f %% of the solid is in smaller pieces and falls out; %s",
+            100 * (1 - kept),
+            advice,
+        )
     return grey, figures
 
 
@@ -119,9 +129,12 @@ def remeshed(surface: Surface, edge_length: float, iterations: int = 6) -> Surfa
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(surface.points, surface.faces))
     meshes.meshing_isotropic_explicit_remeshing(
-        targetlen=pymeshlab.PureValue(edge_length), iterations=iterations, checksurfdist=True,
-        maxsurfdist=pymeshlab.PureValue(0.2), featuredeg=60,
-    )  # fmt: skip
+        targetlen=pymeshlab.PureValue(edge_length),
+        iterations=iterations,
+        checksurfdist=True,
+        maxsurfdist=pymeshlab.PureValue(0.2),
+        featuredeg=60,
+    )
     meshes.meshing_remove_unreferenced_vertices()
     result = meshes.current_mesh()
     return Surface(result.vertex_matrix(), result.face_matrix().astype(np.int32))

@@ -51,14 +51,21 @@ def tetrahedralise(surface: Surface, options: TetOptions) -> Mesh:
     diagonal = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     with scratch_folder():
         points, cells = pytetwild.tetrahedralize(
-            surface.points, surface.faces, edge_length_abs=options.edge_length,
-            epsilon=options.envelope / diagonal, stop_energy=options.stop_energy,
-            num_opt_iter=max(options.passes, 1), optimize=options.passes > 0, num_threads=1,
+            surface.points,
+            surface.faces,
+            edge_length_abs=options.edge_length,
+            epsilon=options.envelope / diagonal,
+            stop_energy=options.stop_energy,
+            num_opt_iter=max(options.passes, 1),
+            optimize=options.passes > 0,
+            num_threads=1,
             coarsen=options.coarsen,
-        )  # fmt: skip
+        )
     if len(cells) == 0:
-        raise MeshError(f"the mesher found no inside in a surface of {len(surface.faces)} "
-                        "triangles; check that it is closed and wound outwards")  # fmt: skip
+        raise MeshError(
+            f"the mesher found no inside in a surface of {len(surface.faces)} "
+            "triangles; check that it is closed and wound outwards"
+        )
     return oriented(Mesh(points, cells))
 
 
@@ -66,8 +73,10 @@ def largest_piece(mesh: Mesh) -> tuple[Mesh, dict]:
     """The largest face-connected component, and how many were dropped with their share of cells."""
     label = face_components(mesh)
     keep = label == 0
-    return submesh(mesh, keep), {"pieces": int(label.max()) + 1,
-                                 "dropped_cells": int((~keep).sum())}  # fmt: skip
+    return submesh(mesh, keep), {
+        "pieces": int(label.max()) + 1,
+        "dropped_cells": int((~keep).sum()),
+    }
 
 
 def sized(surface: Surface, size: float, attempts: int = 8, tolerance: float = 0.04) -> Mesh:
@@ -76,11 +85,17 @@ def sized(surface: Surface, size: float, attempts: int = 8, tolerance: float = 0
     The best of `attempts` is kept and logged: the mesher's response is not linear."""
     asked, best = size, None
     for _ in range(attempts):
-        mesh = tetrahedralise(surface, TetOptions(asked, envelope=0.05 * size, passes=40,
-                                                  stop_energy=10.0, coarsen=True))  # fmt: skip
+        mesh = tetrahedralise(
+            surface,
+            TetOptions(asked, envelope=0.05 * size, passes=40, stop_energy=10.0, coarsen=True),
+        )
         measured = mean_edge_length(mesh)
-        log.info("asked for edges of %.2f voxels: %d tets, mean edge %.2f", asked,
-                 len(mesh.cells), measured)  # fmt: skip
+        log.info(
+            "asked for edges of %.2f voxels: %d tets, mean edge %.2f",
+            asked,
+            len(mesh.cells),
+            measured,
+        )
         if best is None or abs(measured - size) < abs(best[0] - size):
             best = measured, mesh
         if abs(measured - size) < tolerance * size:

@@ -43,9 +43,11 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
     The noise is 1.48 times the median absolute deviation of what is below gamma."""
     void, solid = grey[grey < gamma], grey[grey >= gamma]
     if len(void) == 0 or len(solid) == 0:
-        raise GeometryError(f"the threshold {gamma:.1f} leaves no {'solid' if len(void) else 'void'}: "
-                            f"grey levels of the specimen go from {grey.min():.1f} to "
-                            f"{grey.max():.1f}; change geometry.threshold")  # fmt: skip
+        raise GeometryError(
+            f"the threshold {gamma:.1f} leaves no {'solid' if len(void) else 'void'}: "
+            f"grey levels of the specimen go from {grey.min():.1f} to "
+            f"{grey.max():.1f}; change geometry.threshold"
+        )
     level = float(np.median(void))
     noise = 1.4826 * float(np.median(np.abs(void - level)))
     if gamma < level + 2 * noise:
@@ -69,5 +71,9 @@ def find_threshold(smooth: np.ndarray, specimen, porosity: float, setting: str |
     if len(grey) == 0:
         raise GeometryError(f"the specimen holds no voxel ({specimen}); check scans.platens")
     gamma, trials = bisect_threshold(grey, porosity) if setting == "auto" else (setting, [])
-    return {"threshold": float(gamma), "porosity": float(np.mean(grey < gamma)),
-            "target": porosity, "trials": trials} | check_contrast(grey, gamma)  # fmt: skip
+    return {
+        "threshold": float(gamma),
+        "porosity": float(np.mean(grey < gamma)),
+        "target": porosity,
+        "trials": trials,
+    } | check_contrast(grey, gamma)

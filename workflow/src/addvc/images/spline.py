@@ -12,7 +12,7 @@ from scipy import ndimage
 
 
 def interpolating_coefficients(volume: np.ndarray) -> np.ndarray:
-    """Coefficients of the cubic B-spline through every voxel of `volume` (nx, ny, nz), float32."""
+    """Coefficients of the cubic B-spline through every inner voxel of `volume` (nx, ny, nz), float32."""
     return ndimage.spline_filter(volume, order=3, output=np.float32, mode="mirror")
 
 

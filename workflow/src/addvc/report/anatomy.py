@@ -4,12 +4,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from addvc.fem.mesh import Mesh
 from addvc.geometry.region import Region, caps_depth
 from addvc.images.platens import find_platens
 from addvc.images.spline import gaussian_blur
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, aspect, oblique, render
+from addvc.report.scene import Layer, View, aspect, oblique, render
 from addvc.report.surfaces import (
     boundary,
     box_corners,
@@ -56,20 +57,25 @@ def meso_meshes(case: Case, outputs: Iterable[str]) -> None:
     fit = case.mesh(case.meso[0]).points
     for panel, (ax, name) in enumerate(zip(axes, case.meso, strict=True)):
         mesh, facts = case.mesh(name), case.mesh_facts(name)
-        shift = centroids(mesh) - (mesh.points.min(axis=0) + mesh.points.max(axis=0)) / 2
-        hidden = (shift @ view.right > 0) & (shift @ (view.towards - view.towards[axis] * np.eye(3)[axis]) > 0)  # fmt: skip
-        outer, owner = boundary(mesh)
-        inner, inside = boundary(mesh, ~hidden)
-        keys = set(map(tuple, np.sort(outer, axis=1)))
-        skin = np.array([tuple(face) in keys for face in np.sort(inner, axis=1)])
-        colour = np.where(skin[:, None], [157, 191, 224], [240, 200, 140]).astype(np.uint8)
-        layers = [Layer(mesh.points, inner, colour, edges=True, line_width=2)]
-        render(layers, view, 170 / len(axes), fit).show(ax)
+        render([_opened(mesh, view, axis)], view, 170 / len(axes), fit).show(ax)
         style.headline(ax, name, panel)
-        text = (f"mean edge {facts['mean_edge']:.1f} voxels\n{facts['nodes']:,} nodes\n"
-                f"{facts['cells']:,} tetrahedra")  # fmt: skip
+        text = (
+            f"mean edge {facts['mean_edge']:.1f} voxels\n{facts['nodes']:,} nodes\n"
+            f"{facts['cells']:,} tetrahedra"
+        )
         ax.text(0.5, -0.03, text, transform=ax.transAxes, ha="center", va="top")
     style.save(fig, outputs)
+
+
+def _opened(mesh: Mesh, view: View, axis: int) -> Layer:
+    """A mesh without the quarter of its cells at the right and in front, the inside in sand."""
+    shift = centroids(mesh) - (mesh.points.min(axis=0) + mesh.points.max(axis=0)) / 2
+    front = view.towards * (np.arange(3) != axis)
+    inner, _ = boundary(mesh, ~((shift @ view.right > 0) & (shift @ front > 0)))
+    skin = set(map(tuple, np.sort(boundary(mesh)[0], axis=1)))
+    outside = np.array([tuple(face) in skin for face in np.sort(inner, axis=1)])
+    colour = np.where(outside[:, None], [157, 191, 224], [240, 200, 140]).astype(np.uint8)
+    return Layer(mesh.points, inner, colour, edges=True, line_width=2)
 
 
 def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
@@ -115,16 +121,23 @@ def region(case: Case, outputs: Iterable[str]) -> None:
     _close_up(right, mesh, case, view)
     style.scale_bar(right, voxel_um)
     facts = case.mesh_facts("micro")
-    style.headline(right, "the mesh close up", 1)
-    right.text(1, -0.04, f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra\n"
-               f"mean volume {facts['mean_volume']:.2f} voxel³", transform=right.transAxes,
-               ha="right", va="top")  # fmt: skip
+    style.headline(right, "its mesh close up", 1)
+    right.text(
+        1,
+        -0.02,
+        f"{facts['nodes']:,} nodes\n{facts['cells']:,} tetrahedra\n"
+        f"of {facts['mean_volume']:.2f} voxel³ in the mean",
+        transform=right.transAxes,
+        ha="right",
+        va="top",
+        fontsize=8,
+    )
     style.save(fig, outputs)
 
 
 def _close_up(ax, mesh, case: Case, view) -> None:
-    """Edges of the mesh in a box of one cell around its densest place near the middle."""
-    half = 0.5 * case.cell_size
+    """Edges of the mesh in a box of 0.8 cell around its densest place near the middle."""
+    half = 0.4 * case.cell_size
     where = centroids(mesh)
     near = where[np.linalg.norm(where - mesh.points.mean(axis=0), axis=1) < 3 * half]
     near = near if len(near) else where
@@ -140,18 +153,21 @@ def _close_up(ax, mesh, case: Case, view) -> None:
 def penalised(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 9: nodes of the ends and of the sides, whose curvature is penalised (D_L)."""
     mesh, kind = case.mesh("micro"), case.penalised()
-    colours = np.array([[212, 216, 221], [61, 134, 207], [224, 130, 20]], dtype=np.uint8)
+    colours = np.array([[191, 197, 204], [61, 134, 207], [224, 130, 20]], dtype=np.uint8)
     faces, _ = boundary(mesh)
     on_faces = colours[kind[faces].max(axis=1)]
     axis = case.specimen.axis
     fig = style.figure(88)
     axes = fig.subplots(1, 2)
-    for panel, (ax, view) in enumerate(zip(axes, (oblique(axis), oblique(axis, 35, 75)), strict=True)):  # fmt: skip
+    views = {"from the side": oblique(axis), "from above": oblique(axis, 35, 75)}
+    for panel, (ax, (name, view)) in enumerate(zip(axes, views.items(), strict=True)):
         render([Layer(mesh.points, faces, on_faces)], view, 80, shadows=True).show(ax)
-        style.headline(ax, ("from the side", "from above")[panel], panel)
+        style.headline(ax, name, panel)
     style.scale_bar(axes[0], case.voxel_um())
     names = ("equilibrium gap", "curvature, ends", "curvature, sides")
-    handles = [style.line(tuple(c / 255), f"{name}, {np.sum(kind == n):,} nodes", "", "s")
-               for n, (c, name) in enumerate(zip(colours, names, strict=True))]  # fmt: skip
+    handles = [
+        style.line(tuple(c / 255), f"{name}, {np.sum(kind == n):,} nodes", "", "s")
+        for n, (c, name) in enumerate(zip(colours, names, strict=True))
+    ]
     fig.legend(handles=handles, loc="outside lower center", ncols=3, columnspacing=1)
     style.save(fig, outputs)

@@ -17,10 +17,25 @@ def build_report(output: str | Path, snakefile: str, config: str, target: str) -
     Runs within the run that makes it, hence without taking its lock. Raises AddvcError with the
     end of snakemake's own words when it fails."""
     with atomic_path(output) as temporary:
-        command = [sys.executable, "-m", "snakemake", target, "--report", str(temporary), "--nolock",
-                   "--snakefile", snakefile, "--configfile", config, "--cores", "1"]  # fmt: skip
+        command = [
+            sys.executable,
+            "-m",
+            "snakemake",
+            target,
+            "--report",
+            str(temporary),
+            "--nolock",
+            "--snakefile",
+            snakefile,
+            "--configfile",
+            config,
+            "--cores",
+            "1",
+        ]
         done = subprocess.run(command, capture_output=True, text=True)
         log.info("%s", done.stderr.strip())
         if done.returncode:
-            raise AddvcError(f"snakemake --report ended with status {done.returncode}: "
-                             f"{done.stderr.strip()[-2000:]}")  # fmt: skip
+            raise AddvcError(
+                f"snakemake --report ended with status {done.returncode}: "
+                f"{done.stderr.strip()[-2000:]}"
+            )

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from addvc.analysis.validity import verdict
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.store import load_solution
 from addvc.fem.io import read_mesh, read_vtu
@@ -36,8 +37,13 @@ class Case:
         """From {root, labels, meso, micro}, and the input files of the job."""
         allowed = None if inputs is None else frozenset(Path(name) for name in inputs)
         labels = {int(n): label for n, label in description["labels"].items()}
-        return cls(Path(description["root"]), labels, tuple(description["meso"]),
-                   tuple(description["micro"]), allowed)  # fmt: skip
+        return cls(
+            Path(description["root"]),
+            labels,
+            tuple(description["meso"]),
+            tuple(description["micro"]),
+            allowed,
+        )
 
     @property
     def states(self) -> list[int]:
@@ -52,8 +58,10 @@ class Case:
         """A file of the case; UndeclaredInput unless the job declares it."""
         path = self.root / name
         if self.inputs is not None and path not in self.inputs:
-            raise UndeclaredInput(f"{path} is not among the {len(self.inputs)} inputs of this job; "
-                                  "add it to the rule in workflow/rules/figures.smk")  # fmt: skip
+            raise UndeclaredInput(
+                f"{path} is not among the {len(self.inputs)} inputs of this job; "
+                "add it to the rule in workflow/rules/figures.smk"
+            )
         return path
 
     def json(self, name: str) -> dict:
@@ -74,7 +82,7 @@ class Case:
         return float(self.json("geometry/cell_size.json")["cell_size"])
 
     def image(self, state: int, smooth: bool = True) -> tuple[np.ndarray, float]:
-        """Volume (nx, ny, nz) of a state, 0 for the reference, and its voxel size in micrometres."""
+        """Volume (nx, ny, nz) of a state, 0 for the reference, and its voxel size in µm."""
         volume, attrs = load_volume(self.path(image_name(state, smooth)))
         return volume, float(attrs["voxel_size_um"])
 
@@ -112,11 +120,30 @@ class Case:
         with h5py.File(self.path(f"dvc/{mesh}_state{state}.h5")) as file:
             return bool(file.attrs["converged"])
 
-    def title(self, state: int, *meshes: str) -> str:
-        """The label of a state; `failed` with the names of those of the meshes that failed."""
-        failed = [mesh for mesh in meshes if not self.converged(mesh, state)]
-        which = "" if len(meshes) == 1 else f" ({', '.join(failed)})"
-        return self.labels[state] + (f": failed{which}" if failed else "")
+    def valid_share(self, mesh: str, state: int) -> float:
+        """Share of the nodes whose residual is no more than noise explains."""
+        return float(read_vtu(self.path(f"fields/{mesh}_state{state}.vtu"))[2]["valid"].mean())
+
+    def status(self, mesh: str, state: int) -> str:
+        """Nothing for a good result; `failed` when most of the struts are off; `not converged`."""
+        converged = self.converged(mesh, state)
+        if mesh in self.micro and verdict(converged, self.valid_share(mesh, state)) == "failed":
+            return "failed"
+        return "" if converged else "not converged"
+
+    def title(self, state: int, mesh: str) -> str:
+        """The label of a state, and what is wrong with its result on a mesh."""
+        status = self.status(mesh, state)
+        return self.labels[state] + (f": {status}" if status else "")
+
+    def shown_state(self) -> int:
+        """The last state that both the finest meso mesh and `micro` got right, else the last."""
+        good = [
+            n
+            for n in self.states
+            if not (self.status(self.micro[0], n) or self.status(self.finest, n))
+        ]
+        return (good or self.states)[-1]
 
 
 def image_name(state: int, smooth: bool = True) -> str:

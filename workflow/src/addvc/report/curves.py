@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from addvc.report import style
 from addvc.report.case import Case
@@ -30,7 +31,8 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
     ax.plot(radius, curve, color=style.DARK)
     ax.axhline(0, color="#999999", lw=0.6, zorder=0)
     measured = found["source"] == "measured"
-    text = f"{'cell size' if measured else 'cell size, as configured'}\n{size:.1f} voxels = {size * voxel_um:.0f} µm"  # fmt: skip
+    name = "cell size" if measured else "cell size, as configured"
+    text = f"{name}\n{size:.1f} voxels = {size * voxel_um:.0f} µm"
     at = float(np.interp(size, radius, curve))
     if measured:
         ax.plot(size, at, "o", color=style.RED, ms=6, zorder=3)
@@ -39,15 +41,21 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
     tail = curve[radius > 0.3 * size]
     reach = max(tail.max() - min(tail.min(), 0), 0.02)
     ax.set_ylim(min(tail.min(), 0) - 0.2 * reach, at + 2.6 * reach)
-    ax.annotate(text, (size, at), (0.52, 0.72), textcoords="axes fraction", color=style.RED,
-                arrowprops={"arrowstyle": "-", "color": style.RED, "lw": 0.7})  # fmt: skip
+    ax.annotate(
+        text,
+        (size, at),
+        (0.52, 0.72),
+        textcoords="axes fraction",
+        color=style.RED,
+        arrowprops={"arrowstyle": "-", "color": style.RED, "lw": 0.7},
+    )
     ax.set(xlabel="radius (voxels)", ylabel="normalised autocorrelation (–)", xlim=(0, radius[-1]))
     top = ax.secondary_xaxis("top", functions=(lambda x: x * voxel_um, lambda x: x / voxel_um))
     top.set_xlabel("radius (µm)")
 
 
 def histograms(case: Case, outputs: Iterable[str]) -> None:
-    """Fig. 12: density of r over the struts, all states, for the finest meso mesh and each micro."""
+    """Fig. 12: density of r over the struts, all states: finest meso mesh, each micro method."""
     names = [case.finest, *case.micro]
     fig = style.figure(72)
     axes = fig.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
@@ -58,18 +66,25 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         kind = "mesoscale" if name == case.finest else "microscale"
         style.headline(ax, f"{kind} ({name})", number)
         ax.set_xlabel("residual r (grey levels)")
+        ax.xaxis.set_major_locator(MaxNLocator(5))
         ax.legend(loc="upper left", handlelength=1.2, borderaxespad=0.1)
     low, high = axes[0].get_ylim()
-    axes[0].set(ylabel="density (1 / grey level)", xlim=(-reach, reach),
-                ylim=(low, low + (high - low) * (1.05 + 0.09 * len(case.states))))  # fmt: skip
+    axes[0].set(
+        ylabel="density (1 / grey level)",
+        xlim=(-reach, reach),
+        ylim=(low, low + (high - low) * (1.05 + 0.09 * len(case.states))),
+    )
     style.save(fig, outputs)
 
 
 def _reach(case: Case) -> float:
     """Half width of the histograms: 4 standard deviations of the worst result that converged."""
-    sigma = [case.residual(name, state)[2]["std"]
-             for name in (case.finest, *case.micro) for state in case.states
-             if case.converged(name, state)]  # fmt: skip
+    sigma = [
+        case.residual(name, state)[2]["std"]
+        for name in (case.finest, *case.micro)
+        for state in case.states
+        if not case.status(name, state)
+    ]
     return 4 * float(max(sigma)) if sigma else 100.0
 
 
@@ -78,10 +93,15 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
     r, weight, stats = case.residual(name, state)
     counts, edges = np.histogram(r, bins=120, range=(-reach, reach), weights=weight)
     density = counts / (weight.sum() * np.diff(edges))
-    failed = not case.converged(name, state)
     label = f"{case.title(state, name)}, σ = {stats['std']:.2f}"
-    ax.plot((edges[1:] + edges[:-1]) / 2, density, color=style.SERIES[(state - 1) % 6],
-            ls="--" if failed else "-", lw=1.3, label=label)  # fmt: skip
+    ax.plot(
+        (edges[1:] + edges[:-1]) / 2,
+        density,
+        color=style.SERIES[(state - 1) % 6],
+        ls="--" if case.status(name, state) else "-",
+        lw=1.3,
+        label=label,
+    )
 
 
 def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float]) -> None:
@@ -104,8 +124,10 @@ def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float])
     for ax in axes[::columns]:
         ax.set_ylabel("rms(du) (voxels)")
     handles = [style.line(style.SERIES[(n - 1) % 6], case.labels[n]) for n in case.states]
-    handles += [style.line("#777777", "criterion", ls=":"),
-                style.line(style.RED, "failed", ls="", marker="x")]  # fmt: skip
+    handles += [
+        style.line("#777777", "criterion", ls=":"),
+        style.line(style.RED, "not converged", ls="", marker="x"),
+    ]
     fig.legend(handles=handles, loc="outside lower center", ncols=6)
     style.save(fig, outputs)
 
@@ -125,8 +147,8 @@ def errors(case: Case, outputs: Iterable[str]) -> None:
     names = [*case.meso, *case.micro]
     fig = style.figure(88)
     axes = fig.subplots(1, 2, sharey=True)
-    for number, (ax, text) in enumerate(zip(axes, ("whole error: rms, and p95 above it",
-                                            "rms normal to the strut, and along it"), strict=True)):  # fmt: skip
+    titles = "whole error: rms, and p95 above it", "rms normal to the strut, and along it"
+    for number, (ax, text) in enumerate(zip(axes, titles, strict=True)):
         style.headline(ax, text, number)
         ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
         ax.set_xticklabels([case.labels[n] for n in case.states])
@@ -137,22 +159,28 @@ def errors(case: Case, outputs: Iterable[str]) -> None:
             found = case.json(f"analysis/error_{name}_state{state}.json")
             if found:
                 x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
-                _error(axes, x, found, place, case.converged(name, state))
+                _error(axes, x, found, place, not case.status(name, state))
     axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")
-    handles = [style.line(style.SERIES[n % 6], name, ls="", marker=style.MARKERS[n % 6])
-               for n, name in enumerate(names)]  # fmt: skip
-    handles += [style.line("#555555", "p95 / along the strut", ls="", marker="_"),
-                style.line(style.RED, "failed", ls="", marker="x")]  # fmt: skip
+    handles = [
+        style.line(style.SERIES[n % 6], name, ls="", marker=style.MARKERS[n % 6])
+        for n, name in enumerate(names)
+    ]
+    handles += [
+        style.line("#555555", "p95 / along the strut", ls="", marker="_"),
+        style.line(style.RED, "failed or not converged", ls="", marker="x"),
+    ]
     fig.legend(handles=handles, loc="outside lower center", ncols=-(-len(handles) // 2))
     style.save(fig, outputs)
 
 
-def _error(axes, x: float, found: dict, place: int, converged: bool) -> None:
+def _error(axes, x: float, found: dict, place: int, good: bool) -> None:
     """Marks of one result in both panels."""
     colour, marker = style.SERIES[place % 6], style.MARKERS[place % 6]
     for ax, main, other in ((axes[0], "rms", "p95"), (axes[1], "rms_normal", "rms_along")):
+        if found.get(main) is None:
+            continue
         ax.plot([x, x], [found[main], found[other]], color=colour, lw=0.8)
         ax.plot(x, found[other], "_", color=colour, ms=7, mew=1.5)
         ax.plot(x, found[main], marker, color=colour, ms=4.5)
-        if not converged:
+        if not good:
             ax.plot(x, found[main], "x", color=style.RED, ms=8, mew=1.8, zorder=4)

@@ -16,24 +16,35 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     mesh, names = case.mesh("micro"), [case.finest, *case.micro]
     faces, owner = boundary(mesh)
     view = oblique(case.specimen.axis)
-    values = {(name, n): _cell_residual(case, name, n)[owner] for name in names
-              for n in case.states}  # fmt: skip
-    usable = [v for (name, n), v in values.items() if case.converged(name, n)]
+    values = {
+        (name, n): _cell_residual(case, name, n)[owner] for name in names for n in case.states
+    }
+    usable = [v for (name, n), v in values.items() if not case.status(name, n)]
     norm = style.robust_range(usable or list(values.values()), signed=True, share=1)
     columns = len(case.states)
     fig, axes = style.panels(len(names), columns, aspect(view, mesh.points), 8, 18, below=6)
     for row, name in enumerate(names):
         for column, state in enumerate(case.states):
-            layer = Layer(mesh.points, faces, values=values[name, state], norm=norm,
-                          cmap=style.SIGNED)  # fmt: skip
+            layer = Layer(
+                mesh.points, faces, values=values[name, state], norm=norm, cmap=style.SIGNED
+            )
             ax = axes[row, column]
             render([layer], view, 150 / columns).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
             if column == 0:
-                ax.text(-0.03, 0.5, name, transform=ax.transAxes, rotation=90, ha="right",
-                        va="center", fontsize=9)  # fmt: skip
+                ax.text(
+                    -0.03,
+                    0.5,
+                    name,
+                    transform=ax.transAxes,
+                    rotation=90,
+                    ha="right",
+                    va="center",
+                    fontsize=9,
+                )
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
-    style.colour_bar(fig, axes, norm, style.SIGNED, "residual r (grey levels)", shrink=0.7, aspect=30)
+    label = "residual r (grey levels)"
+    style.colour_bar(fig, axes, norm, style.SIGNED, label, shrink=0.7, aspect=30)
     style.save(fig, outputs)
 
 
@@ -45,16 +56,15 @@ def _cell_residual(case: Case, name: str, state: int) -> np.ndarray:
     return total / np.maximum(weight.reshape(cells, -1).sum(axis=1), 1e-12)
 
 
-def fields(case: Case, outputs: Iterable[str], state: int) -> None:
+def fields(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 15: u_x, u_y, u_z and the norm of the strain in a slice a cell thick; left the finest
     meso mesh, right micro DVC."""
-    names = (case.finest, "micro")
+    names, state = (case.finest, case.micro[0]), case.shown_state()
     slices = [_slice(case, name, state) for name in names]
     labels = [f"$u_{x}$ ({style.voxels(case.voxel_um())})" for x in style.AXES]
     labels.append(r"strain $\|\varepsilon\|_F$ (–)")
     view = facing(case.specimen.axis, slab(case.mesh("micro"), case.specimen.axis, 1)[0])
-    shape = min(aspect(view, slices[0][0]), 0.95)
-    fig, axes = style.panels(4, 2, 0.8 * shape, 8, 20, below=6)
+    fig, axes = style.panels(4, 2, aspect(view, slices[0][0]), 7, 18, below=6)
     for d, label in enumerate(labels):
         pair = [fields[d] for _, _, fields in slices]
         norm, cmap = _strain_range(pair) if d == 3 else style.component_range(pair)
@@ -62,7 +72,7 @@ def fields(case: Case, outputs: Iterable[str], state: int) -> None:
             points, faces, _ = slices[column]
             layer = Layer(points, faces, values=pair[column], norm=norm, cmap=cmap)
             render([layer], view, 75).show(axes[d, column])
-            text = f"{'mesoscale' if column == 0 else 'microscale'}, {case.title(state, name)}"
+            text = f"{name}, {case.title(state, name)}"
             style.headline(axes[d, column], text, 2 * d + column)
         style.colour_bar(fig, axes[d], norm, cmap, label, aspect=16, shrink=0.9, pad=0.02)
     style.scale_bar(axes[-1, 0], case.voxel_um())
@@ -80,6 +90,6 @@ def _slice(case: Case, name: str, state: int) -> tuple[np.ndarray, np.ndarray, l
 
 
 def _strain_range(pair: list[np.ndarray]) -> tuple[style.Normalize, str]:
-    """From zero to what all but 2 % of both stay below, each counting half."""
+    """From zero to what all but 2 % of either stay below, with more colours for small strains."""
     top = max(float(np.percentile(values, 98)) for values in pair)
-    return style.Normalize(0, top), style.MAGNITUDE
+    return style.root_range(0.0, max(top, 1e-3)), style.MAGNITUDE

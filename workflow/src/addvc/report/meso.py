@@ -22,17 +22,31 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
     for row, (name, mesh) in enumerate(zip(case.meso, meshes, strict=True)):
         for column, state in enumerate(case.states):
             solution = case.solution(name, state)
-            colour = GOOD if solution.converged else BAD
+            colour = BAD if case.status(name, state) else GOOD
             faces, _ = boundary(mesh)
             layer = Layer(mesh.points + solution.u, faces, colour, edges=True, line_width=1.5)
             ax = axes[row, column]
             render([layer], view, 170 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
-            ax.text(0.5, 0, f"σ(r) = {solution.residual['std']:.2f}", transform=ax.transAxes,
-                    ha="center", va="top")  # fmt: skip
+            ax.text(
+                0.5,
+                0,
+                f"σ(r) = {solution.residual['std']:.2f}",
+                transform=ax.transAxes,
+                ha="center",
+                va="top",
+            )
             if column == 0:
-                ax.text(-0.02, 0.5, name, transform=ax.transAxes, rotation=90, ha="right",
-                        va="center", fontsize=9)  # fmt: skip
+                ax.text(
+                    -0.02,
+                    0.5,
+                    name,
+                    transform=ax.transAxes,
+                    rotation=90,
+                    ha="right",
+                    va="center",
+                    fontsize=9,
+                )
     style.save(fig, outputs)
 
 
@@ -49,7 +63,7 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
     view, fit = oblique(axis, azimuth=20, elevation=18), _reach(mesh)
     u = {n: case.solution(name, n).u for n in case.states}
     halves = {n: _half(mesh, u[n], axis) for n in case.states}
-    usable = [n for n in case.states if case.converged(name, n)] or case.states
+    usable = [n for n in case.states if not case.status(name, n)] or case.states
     columns = len(u)
     fig, axes = style.panels(3, columns, aspect(view, fit), bar=16)
     for d in range(3):

@@ -14,8 +14,10 @@ from matplotlib.colors import Normalize, to_rgb
 from addvc.errors import AddvcError
 from addvc.report.style import DPI, INCH, SOLID
 
-REMEDY = ("install the software renderer: `apt install libegl1 libgl1-mesa-dri` (Debian, Ubuntu), "
-          "`dnf install mesa-libEGL mesa-dri-drivers` (Fedora, Rocky)")  # fmt: skip
+REMEDY = (
+    "install the software renderer: `apt install libegl1 libgl1-mesa-dri` (Debian, Ubuntu), "
+    "`dnf install mesa-libEGL mesa-dri-drivers` (Fedora, Rocky)"
+)
 
 HAZE = 0.55  # share of white in the farthest faces
 
@@ -65,7 +67,7 @@ class Picture:
 
 
 def facing(axis: int, normal: int) -> View:
-    """Straight onto the planes across axis `normal`, the loading axis up, the third to the right."""
+    """Straight onto the planes across axis `normal`: the loading axis up, the third right."""
     up, right = np.eye(3)[axis], np.eye(3)[3 - axis - normal]
     return View(right, up, np.cross(right, up))
 
@@ -88,7 +90,7 @@ def aspect(view: View, points: np.ndarray) -> float:
 
 @cache
 def plotter_class():
-    """pyvista.Plotter that draws off screen; AddvcError with the package to install if it cannot."""
+    """pyvista.Plotter that draws off screen; AddvcError with what to install if it cannot."""
     if sys.platform.startswith("linux"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         try:
@@ -108,17 +110,23 @@ def plotter_class():
     return pyvista.Plotter
 
 
-def render(layers: list[Layer], view: View, width_mm: float, fit: np.ndarray | None = None,
-           shadows: bool = False, margin: float = 0.02) -> Picture:  # fmt: skip
-    """The layers seen from `view`, a picture for a print `width_mm` wide that holds the points `fit`
-    (n, 3), by default all. `shadows`: ambient occlusion, and haze with depth."""
+def render(
+    layers: list[Layer],
+    view: View,
+    width_mm: float,
+    fit: np.ndarray | None = None,
+    shadows: bool = False,
+    margin: float = 0.02,
+) -> Picture:
+    """The layers seen from `view`, a picture for a print `width_mm` wide that holds the points
+    `fit` (n, 3), by default all. `shadows`: ambient occlusion, and haze with depth."""
     points = np.vstack([layer.points for layer in layers]) if fit is None else fit
     flat = view.project(points)
     low, high = flat.min(axis=0), flat.max(axis=0)
     size = (high - low) * (1 + 2 * margin)
     middle = (low + high) / 2
-    columns = int(round(width_mm * INCH * DPI))
-    rows = max(8, int(round(columns * size[1] / size[0])))
+    columns = round(width_mm * INCH * DPI)
+    rows = max(8, round(columns * size[1] / size[0]))
     plotter = plotter_class()(off_screen=True, window_size=(columns, rows))
     plotter.set_background("white")
     depth = np.concatenate([layer.points for layer in layers]) @ view.towards
@@ -169,9 +177,15 @@ def _add(plotter, layer: Layer) -> None:
         mesh = pyvista.PolyData(layer.points, lines=pairs)
     else:
         mesh = pyvista.PolyData.from_regular_faces(layer.points, layer.faces)
-    options = {"opacity": layer.opacity, "smooth_shading": layer.smooth,
-               "show_edges": layer.edges, "edge_color": "#30343a",
-               "line_width": layer.line_width, "ambient": 0.3, "diffuse": 0.85}  # fmt: skip
+    options = {
+        "opacity": layer.opacity,
+        "smooth_shading": layer.smooth,
+        "show_edges": layer.edges,
+        "edge_color": "#30343a",
+        "line_width": layer.line_width,
+        "ambient": 0.3,
+        "diffuse": 0.85,
+    }
     colours = layer.colour
     if layer.values is not None:
         colours = (255 * colormaps[layer.cmap](layer.norm(layer.values))[:, :3]).astype(np.uint8)

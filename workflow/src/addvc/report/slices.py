@@ -15,8 +15,14 @@ from addvc.report.surfaces import boundary, whole_foam
 def show_slice(ax: Axes, plane: np.ndarray, limits: tuple[float, float]) -> None:
     """Grey levels (columns, rows) of a plane, the first index to the right, the second up."""
     columns, rows = plane.shape
-    ax.imshow(plane.T, cmap="gray", origin="lower", vmin=limits[0], vmax=limits[1],
-              extent=(-0.5, columns - 0.5, -0.5, rows - 0.5))  # fmt: skip
+    ax.imshow(
+        plane.T,
+        cmap="gray",
+        origin="lower",
+        vmin=limits[0],
+        vmax=limits[1],
+        extent=(-0.5, columns - 0.5, -0.5, rows - 0.5),
+    )
     ax.set_aspect("equal")
 
 
@@ -58,8 +64,15 @@ def _grid_over_slice(ax: Axes, volume: np.ndarray, specimen: Specimen, nodes: np
     ax.hlines(along, across[0], across[-1], color="#5aa9ff", lw=1.2)
     for face, shift, side in ((specimen.low, -2, "top"), (specimen.high, 2, "bottom")):
         ax.axhline(face, color=style.ORANGE, lw=1.2, ls="--")
-        ax.text(0.02 * plane.shape[0], face + shift, "platen", color=style.ORANGE, va=side,
-                fontsize=8, fontweight="bold")  # fmt: skip
+        ax.text(
+            0.02 * plane.shape[0],
+            face + shift,
+            "platen",
+            color=style.ORANGE,
+            va=side,
+            fontsize=8,
+            fontweight="bold",
+        )
     ax.set_axis_off()
 
 

@@ -18,21 +18,33 @@ from matplotlib.lines import Line2D
 from addvc.images.files import atomic_path
 
 INCH = 1 / 25.4
-WIDTH = 170.0  # mm, the text width of a page
+WIDTH, HEIGHT = 170.0, 232.0  # mm, the text of a page
 DPI = 300
 MAGNITUDE, SIGNED = "viridis", "RdBu_r"
-SOLID, BLUE, RED, ORANGE, DARK = "#d4d8dd", "#3d86cf", "#c8341f", "#e08214", "#303438"
+SOLID, BLUE, RED, ORANGE, DARK = "#c6ccd3", "#3d86cf", "#c8341f", "#e08214", "#303438"
 SERIES = ("#440154", "#31688e", "#35b779", "#e6a000", "#c51b7d", "#7f7f7f")
 MARKERS = "osD^vP"
 AXES = "xyz"
 
-plt.rcParams.update({
-    "font.size": 8.5, "axes.titlesize": 9, "axes.labelsize": 8.5, "legend.fontsize": 8,
-    "xtick.labelsize": 8, "ytick.labelsize": 8, "figure.titlesize": 9.5,
-    "axes.linewidth": 0.7, "lines.linewidth": 1.4, "legend.frameon": False,
-    "axes.spines.top": False, "axes.spines.right": False, "savefig.dpi": DPI,
-    "svg.hashsalt": "addvc", "image.interpolation": "antialiased",
-})  # fmt: skip
+plt.rcParams.update(
+    {
+        "font.size": 8.5,
+        "axes.titlesize": 9,
+        "axes.labelsize": 8.5,
+        "legend.fontsize": 8,
+        "xtick.labelsize": 8,
+        "ytick.labelsize": 8,
+        "figure.titlesize": 9.5,
+        "axes.linewidth": 0.7,
+        "lines.linewidth": 1.4,
+        "legend.frameon": False,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "savefig.dpi": DPI,
+        "svg.hashsalt": "addvc",
+        "image.interpolation": "antialiased",
+    }
+)
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
@@ -42,10 +54,12 @@ def figure(height: float, width: float = WIDTH) -> Figure:
 
 def panels(rows: int, columns: int, aspect: float, spare: float = 12.0, bar: float = 0.0,
            below: float = 0.0) -> tuple[Figure, np.ndarray]:  # fmt: skip
-    """A figure of pictures of one aspect (height / width), axes (rows, columns). Millimetres: `spare`
-    above and below each row for words, `bar` at the right of it, `below` the last row."""
+    """A figure of pictures of one aspect (height / width), axes (rows, columns), no larger than a
+    page. Millimetres: `spare` above and below each row for words, `bar` at its right, `below` the
+    last row."""
     width = (WIDTH - bar - 4) / columns - 3
-    fig = figure(rows * (aspect * width + spare) + below)
+    width = min(width, ((HEIGHT - below) / rows - spare) / aspect)
+    fig = figure(rows * (aspect * width + spare) + below, columns * (width + 3) + bar + 4)
     return fig, fig.subplots(rows, columns, squeeze=False)
 
 
@@ -62,10 +76,15 @@ def letter(number: int) -> str:
 def headline(ax: Axes, text: str, number: int | None = None) -> None:
     """Title of a panel with its letter; in red when it tells of a failure."""
     lead = "" if number is None else f"{letter(number)} "
-    ax.set_title(lead + text, loc="left", color=RED if "failed" in text else "black")
+    wrong = "failed" in text or "not converged" in text
+    ax.set_title(
+        lead + text, loc="left", color=RED if wrong else "black", fontsize=8 if wrong else None
+    )
 
 
-def robust_range(values: Iterable[np.ndarray], signed: bool = False, share: float = 0.5) -> Normalize:  # fmt: skip
+def robust_range(
+    values: Iterable[np.ndarray], signed: bool = False, share: float = 0.5
+) -> Normalize:
     """Range of all values but `share` percent at either end; symmetric about 0 if `signed`."""
     flat = np.concatenate([np.ravel(v)[np.isfinite(np.ravel(v))] for v in values])
     low, high = np.percentile(flat, (share, 100 - share))
@@ -84,9 +103,13 @@ def component_range(values: list[np.ndarray], root: bool = False) -> tuple[Norma
     span = norm.vmax - norm.vmin
     both = norm.vmin < -0.15 * span and norm.vmax > 0.15 * span
     norm = robust_range(values, signed=True) if both else norm
-    if root:
-        norm = FuncNorm((_root, _square), norm.vmin, norm.vmax)
+    norm = root_range(norm.vmin, norm.vmax) if root else norm
     return norm, SIGNED if both else MAGNITUDE if norm.vmin > -0.15 * span else f"{MAGNITUDE}_r"
+
+
+def root_range(low: float, high: float) -> Normalize:
+    """A range whose colours follow the square root: much of the map for small values."""
+    return FuncNorm((_root, _square), low, high)
 
 
 def _root(x: np.ndarray) -> np.ndarray:
@@ -97,7 +120,9 @@ def _square(x: np.ndarray) -> np.ndarray:
     return np.sign(x) * np.square(x)
 
 
-def colour_bar(fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options) -> None:  # fmt: skip
+def colour_bar(
+    fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options
+) -> None:
     """A colour bar with pointed ends, since ranges are robust; its width is left to the layout."""
     mappable = ScalarMappable(norm, cmap)
     bar = fig.colorbar(mappable, ax=axes, extend="both", extendfrac=0.03, **options)
@@ -124,10 +149,25 @@ def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3, colour: str = "blac
     micro = length * voxel_um
     size = f"{micro / 1000:.3g} mm" if micro >= 1000 else f"{micro:.3g} µm"
     end = length / (right - left)
-    ax.plot([0, end], [-0.025, -0.025], color=colour, lw=2, transform=ax.transAxes,
-            clip_on=False, solid_capstyle="butt")  # fmt: skip
-    ax.text(0, -0.04, f"{length:g} voxels = {size}", transform=ax.transAxes, va="top", ha="left",
-            fontsize=8, color=colour)  # fmt: skip
+    ax.plot(
+        [0, end],
+        [-0.025, -0.025],
+        color=colour,
+        lw=2,
+        transform=ax.transAxes,
+        clip_on=False,
+        solid_capstyle="butt",
+    )
+    ax.text(
+        0,
+        -0.04,
+        f"{length:g} voxels = {size}",
+        transform=ax.transAxes,
+        va="top",
+        ha="left",
+        fontsize=8,
+        color=colour,
+    )
 
 
 def save(fig: Figure, outputs: Iterable[str | Path]) -> None:

@@ -19,8 +19,9 @@ def boundary(mesh: Mesh, keep: np.ndarray | None = None) -> tuple[np.ndarray, np
     n = len(mesh.points)
     key = order[:, 0] * n + order[:, 1]
     _, key = np.unique(key, return_inverse=True)
-    _, first, count = np.unique(key.astype(np.int64) * n + order[:, 2], return_index=True,
-                                return_counts=True)  # fmt: skip
+    _, first, count = np.unique(
+        key.astype(np.int64) * n + order[:, 2], return_index=True, return_counts=True
+    )
     outer = np.sort(first[count == 1])
     return faces[outer], np.repeat(chosen, len(table))[outer]
 
@@ -52,13 +53,14 @@ def clipped(mesh: Mesh, low, high, **fields: np.ndarray) -> tuple[np.ndarray, np
     `fields`, each (n, ...) of the points or (m, ...) of the cells behind the triangles."""
     import pyvista
 
-    near = (mesh.points[mesh.cells].max(axis=1) >= low) & (mesh.points[mesh.cells].min(axis=1) <= high)  # fmt: skip
-    points, cells, used = compact(mesh.points, mesh.cells[near.all(axis=1)])
+    corner = mesh.points[mesh.cells]
+    near = ((corner.max(axis=1) >= low) & (corner.min(axis=1) <= high)).all(axis=1)
+    points, cells, used = compact(mesh.points, mesh.cells[near])
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: cells}, points)
     for name, values in fields.items():
         on_points = len(values) == len(mesh.points)
         target = grid.point_data if on_points else grid.cell_data
-        target[name] = values[used] if on_points else values[near.all(axis=1)]
+        target[name] = values[used] if on_points else values[near]
     for d in range(3):
         for bound, sign in ((low[d], 1.0), (high[d], -1.0)):
             if grid.n_cells and (sign * (grid.points[:, d] - bound) < 0).any():
@@ -82,8 +84,9 @@ def segmented(volume: np.ndarray, gamma: float, low, high) -> tuple[np.ndarray, 
     return surface.points + start, surface.faces
 
 
-def whole_foam(volume: np.ndarray, gamma: float, specimen: Specimen, low: float,
-               high: float) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def whole_foam(
+    volume: np.ndarray, gamma: float, specimen: Specimen, low: float, high: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Surface of the foam between two positions on the loading axis, binned when very large."""
     factor = int(np.ceil((volume.size / MOST_VOXELS) ** (1 / 3)))
     coarse = bin_mean(volume, factor) if factor > 1 else volume

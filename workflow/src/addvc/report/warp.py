@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from addvc.fem.mesh import Mesh
+from addvc.geometry.region import Region, caps_depth
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, Picture, View, aspect, facing, render
@@ -13,29 +14,35 @@ from addvc.report.surfaces import (
     boundary,
     box_corners,
     clipped,
-    in_box,
     segmented,
     slab,
     slab_box,
 )
 
 MESO, MICRO = "#e0903c", "#3d86cf"
+NEAR = 1.5  # voxels from the middle of a triangle: its plane stands for the surface
 
 
-def warped(case: Case, outputs: Iterable[str], state: int) -> None:
+def warped(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 16: slices of (a) I_r, (b) I_d, and of the micro mesh carried by (c) meso, (d) micro."""
-    mesh, axis = case.mesh("micro"), case.specimen.axis
-    u = {name: case.displacement(name, state) for name in (case.finest, "micro")}
+    mesh, axis, state = case.mesh("micro"), case.specimen.axis, case.shown_state()
+    u = {name: case.displacement(name, state) for name in (case.finest, case.micro[0])}
     before = slab_box(mesh, axis, case.cell_size)
-    after = _carried_box(mesh, u["micro"], before, axis)
+    after = _carried_box(mesh, u[case.micro[0]], before, axis)
     image = segmented(case.image(state)[0], case.gamma, *after)
-    bodies = [segmented(case.image(0)[0], case.gamma, *before), image,
-              *(_cut(mesh, u[name], *after) for name in u)]  # fmt: skip
-    titles = ["segmented $I_r$", f"segmented $I_d$, {case.labels[state]}",
-              *(f"$I_r$ carried by {name}{_failure(case, name, state)}" for name in u)]  # fmt: skip
+    bodies = [
+        segmented(case.image(0)[0], case.gamma, *before),
+        image,
+        *(_cut(mesh, u[name], *after) for name in u),
+    ]
+    titles = [
+        "segmented $I_r$",
+        f"segmented $I_d$, {case.labels[state]}",
+        *(f"$I_r$ carried by {name}{_failure(case, name, state)}" for name in u),
+    ]
     view = facing(axis, slab(mesh, axis, 1)[0])
     fit = np.vstack([box_corners(*before), box_corners(*after)])
-    fig, axes = style.panels(2, 2, min(aspect(view, fit), 1.2), spare=14)
+    fig, axes = style.panels(2, 2, aspect(view, fit), spare=16)
     for panel, (ax, body) in enumerate(zip(axes.flat, bodies, strict=True)):
         layer = Layer(*body, (style.SOLID, style.SOLID, MESO, MICRO)[panel])
         render([layer], view, 82, fit, shadows=True).show(ax)
@@ -48,15 +55,17 @@ def warped(case: Case, outputs: Iterable[str], state: int) -> None:
 
 def _write_gap(ax, gap: np.ndarray) -> None:
     """Below a panel, how far the carried surface is from the segmented image."""
-    text = f"distance to $I_d$: median {np.median(gap):.2f}, p95 {np.percentile(gap, 95):.2f} voxels"
+    middle, far = np.median(gap), np.percentile(gap, 95)
+    text = f"distance to $I_d$: median {middle:.2f}, p95 {far:.2f} voxels"
     ax.text(0.5, -0.02, text, transform=ax.transAxes, ha="center", va="top")
 
 
 def _failure(case: Case, name: str, state: int) -> str:
-    return "" if case.converged(name, state) else " (failed)"
+    status = case.status(name, state)
+    return f" ({status})" if status else ""
 
 
-def _carried_box(mesh: Mesh, u: np.ndarray, box: tuple, axis: int) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def _carried_box(mesh: Mesh, u: np.ndarray, box: tuple, axis: int) -> tuple[np.ndarray, np.ndarray]:
     """The box of a slice after the motion of its nodes: its ends follow the ends of the mesh, its
     faces the median; across it holds whatever has moved out."""
     low, high = (corner.copy() for corner in box)
@@ -78,26 +87,29 @@ def _cut(mesh: Mesh, u: np.ndarray, low, high) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _gap(points: np.ndarray, image: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Distance (n,) of points to the triangles of a segmented image, by their middles, voxels."""
+    """Distance (n,) of points to a segmented image, voxels: to the plane of the nearest triangle,
+    or to its middle when that is farther than its plane says."""
     surface, faces = image
     if len(faces) == 0:
         return np.full(len(points), np.nan)
-    corner = surface[faces]
-    samples = np.vstack([surface, corner.mean(axis=1),
-                         *((corner[:, i] + corner[:, (i + 1) % 3]) / 2 for i in range(3))])  # fmt: skip
-    return cKDTree(samples).query(points)[0]
+    a, b, c = (surface[faces[:, n]] for n in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    distance, nearest = cKDTree((a + b + c) / 3).query(points)
+    above = np.abs(np.einsum("ni,ni->n", points - a[nearest], normal[nearest]))
+    return np.where(distance < NEAR, above, distance)
 
 
-def zoom(case: Case, outputs: Iterable[str], state: int) -> None:
-    """Fig. 17: two places where meso and micro differ most; reference, meso on I_d, micro on I_d."""
-    mesh = case.mesh("micro")
-    u = {name: case.displacement(name, state) for name in (case.finest, "micro")}
+def zoom(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 17: two places where meso and micro differ most: I_r, then either carried onto I_d."""
+    mesh, state = case.mesh("micro"), case.shown_state()
+    u = {name: case.displacement(name, state) for name in (case.finest, case.micro[0])}
     half = 0.45 * case.cell_size
-    places = _places(mesh, np.linalg.norm(u["micro"] - u[case.finest], axis=1), half)
+    places = _places(case, mesh, np.linalg.norm(u[case.micro[0]] - u[case.finest], axis=1), half)
     deformed, gamma = case.image(state)[0], case.gamma
     fig, axes = style.panels(len(places), 3, 1.0)
     for row, node in enumerate(places):
-        view = _across(u["micro"][node] - u[case.finest][node], case.specimen.axis)
+        view = _across(u[case.micro[0]][node] - u[case.finest][node], case.specimen.axis)
         for column, name in enumerate((None, *u)):
             ax, panel = axes[row, column], 3 * row + column
             _zoom(mesh, u, name, node, half, deformed, gamma, view).show(ax)
@@ -112,28 +124,39 @@ def _zoom_title(case: Case, name: str | None, state: int) -> str:
     return rf"$\Omega_d$ and $\Omega_r + u$, {name}{_failure(case, name, state)}"
 
 
-def _zoom(mesh: Mesh, u: dict, name: str | None, node: int, half: float, deformed, gamma: float,
-          view: View) -> Picture:  # fmt: skip
+def _zoom(
+    mesh: Mesh,
+    u: dict,
+    name: str | None,
+    node: int,
+    half: float,
+    deformed,
+    gamma: float,
+    view: View,
+) -> Picture:
     """One panel: the reference, or in grey I_d with the carried reference in red."""
-    centre = mesh.points[node] + (0 if name is None else u["micro"][node])
+    centre = mesh.points[node] + (0 if name is None else list(u.values())[-1][node])
     box = centre - half, centre + half
     fit = centre + half * np.vstack([view.right + view.up, -view.right - view.up])
     if name is None:
         return render([Layer(*_cut(mesh, np.zeros_like(mesh.points), *box))], view, 55, fit)
-    layers = [Layer(*segmented(deformed, gamma, *box), style.SOLID, opacity=0.6, smooth=True),
-              Layer(*_cut(mesh, u[name], *box), style.RED)]  # fmt: skip
+    layers = [
+        Layer(*segmented(deformed, gamma, *box), style.SOLID, opacity=0.6, smooth=True),
+        Layer(*_cut(mesh, u[name], *box), style.RED),
+    ]
     return render(layers, view, 55, fit)
 
 
-def _places(mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:
-    """Nodes where the gap, averaged over its surroundings, is largest; 3 `half` apart and away from
-    the ends of the mesh."""
+def _places(case: Case, mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:
+    """Nodes where the gap, averaged over its surroundings, is largest, 3 `half` apart: inside the
+    region, among at least as many struts as is usual."""
     nodes = np.unique(boundary(mesh)[0])[::4]
     tree = cKDTree(mesh.points)
-    around = np.array([gap[near].mean() for near in tree.query_ball_point(mesh.points[nodes], half / 4)])  # fmt: skip
-    low, high = mesh.points.min(axis=0) + half, mesh.points.max(axis=0) - half
-    inner = in_box(mesh.points[nodes], low, high)
-    around = np.where(inner if inner.any() else True, around, -1)
+    close = tree.query_ball_point(mesh.points[nodes], half / 3)
+    around = np.array([gap[near].mean() for near in close])
+    depth = np.min(caps_depth(Region(**case.json("geometry/region.json")), mesh.points[nodes]), 0)
+    crowd = tree.query_ball_point(mesh.points[nodes], half, return_length=True)
+    around[(depth < half) | (crowd < np.median(crowd))] -= 1e6
     chosen: list[int] = []
     for place in np.argsort(-around):
         away = np.linalg.norm(mesh.points[chosen] - mesh.points[nodes[place]], axis=1)

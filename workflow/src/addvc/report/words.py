@@ -62,7 +62,7 @@ def front_page(summary: dict, config: dict, scans: dict) -> str:
     lines += heading("Meshes") + meshes_table(summary)
     lines += heading("Cost") + cost_table(summary["cost"])
     lines += heading("Scans") + scans_table(scans)
-    lines += heading("Configuration") + ["::", ""]
+    lines += [*heading("Configuration"), "::", ""]
     lines += ["   " + line for line in yaml.safe_dump(config, sort_keys=False).splitlines()]
     lines += heading("Versions")
     lines += [", ".join(f"{name} {number}" for name, number in summary["versions"].items())]
@@ -72,15 +72,20 @@ def front_page(summary: dict, config: dict, scans: dict) -> str:
 def answer(summary: dict) -> list[str]:
     """What was measured, in a few sentences."""
     size = summary["voxel_size_um"]
-    lines = [f"Displacement of the solid at {len(summary['states'])} loading states. Cell size "
-             f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
-             f"threshold {summary['threshold']:.1f} grey levels for a porosity of "
-             f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.", ""]  # fmt: skip
+    lines = [
+        f"Displacement of the solid at {len(summary['states'])} loading states. Cell size "
+        f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
+        f"threshold {summary['threshold']:.1f} grey levels for a porosity of "
+        f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.",
+        "",
+    ]
     for state in summary["states"]:
         found = state[micro_name(summary)]
-        lines.append(f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
-                     f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
-                     f"valid{error_words(found['error'])}.")  # fmt: skip
+        lines.append(
+            f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
+            f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
+            f"valid{error_words(found['error'])}."
+        )
     return lines
 
 
@@ -91,18 +96,24 @@ def warnings(summary: dict) -> list[str]:
         for mesh in summary["meshes"]:
             one = state[mesh]
             if not one["converged"]:
-                found.append(f"- State {state['state']}, {mesh}: the loop did not end in "
-                             f"{one['iterations']} iterations (last rms(du) {one['last_step']:.1e} "
-                             "voxel). Look at the residual maps (Fig. 13); a longer "
-                             "regularisation length or a better start may help.")  # fmt: skip
+                found.append(
+                    f"- State {state['state']}, {mesh}: the loop did not end in "
+                    f"{one['iterations']} iterations (last rms(du) {one['last_step']:.1e} "
+                    "voxel). Look at the residual maps (Fig. 13); a longer "
+                    "regularisation length or a better start may help."
+                )
         if state["verdict"] == "failed":
-            found.append(f"- State {state['state']} could not be registered: over half of its nodes "
-                         "have a residual far above the noise of the images.")  # fmt: skip
+            found.append(
+                f"- State {state['state']} could not be registered: over half of its nodes "
+                "have a residual far above the noise of the images."
+            )
     micro = summary["meshes"][micro_name(summary)]
     kept = micro["kept_fraction"] * micro["voxel_kept_fraction"]
     if kept < 0.9:
-        found.append(f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
-                     "and was left out; lower mesh.size, the porosity or images.blur.")  # fmt: skip
+        found.append(
+            f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
+            "and was left out; lower mesh.size, the porosity or images.blur."
+        )
     return found or ["None."]
 
 
@@ -122,33 +133,66 @@ def results_table(summary: dict) -> list[str]:
 
 def convergence_table(summary: dict) -> list[str]:
     """Start, iterations and last step of every state and mesh."""
-    rows = [[state["label"], state["start"], mesh, str(state[mesh]["iterations"]),
-             f"{state[mesh]['last_step']:.1e}", "yes" if state[mesh]["converged"] else "NO"]
-            for state in summary["states"] for mesh in summary["meshes"]]  # fmt: skip
-    return list_table(["state", "start", "mesh", "iterations", "last rms(du), voxel", "converged"],
-                      rows)  # fmt: skip
+    rows = [
+        [
+            state["label"],
+            state["start"],
+            mesh,
+            str(state[mesh]["iterations"]),
+            f"{state[mesh]['last_step']:.1e}",
+            "yes" if state[mesh]["converged"] else "NO",
+        ]
+        for state in summary["states"]
+        for mesh in summary["meshes"]
+    ]
+    return list_table(
+        ["state", "start", "mesh", "iterations", "last rms(du), voxel", "converged"], rows
+    )
 
 
 def meshes_table(summary: dict) -> list[str]:
     """Size, quality and ultimate error of each mesh."""
-    rows = [[name, str(m["nodes"]), str(m["cells"]), f"{m['mean_edge']:.2f}",
-             f"{m['mean_volume']:.3g}", f"{m['min_dihedral']:.1f}", f"{m['ultimate_error']:.2e}"]
-            for name, m in summary["meshes"].items()]  # fmt: skip
-    return list_table(["mesh", "nodes", "cells", "mean edge, voxel", "mean volume, voxel^3",
-                       "least dihedral angle, degrees", "ultimate error, voxel"], rows)  # fmt: skip
+    rows = [
+        [
+            name,
+            str(m["nodes"]),
+            str(m["cells"]),
+            f"{m['mean_edge']:.2f}",
+            f"{m['mean_volume']:.3g}",
+            f"{m['min_dihedral']:.1f}",
+            f"{m['ultimate_error']:.2e}",
+        ]
+        for name, m in summary["meshes"].items()
+    ]
+    return list_table(
+        [
+            "mesh",
+            "nodes",
+            "cells",
+            "mean edge, voxel",
+            "mean volume, voxel^3",
+            "least dihedral angle, degrees",
+            "ultimate error, voxel",
+        ],
+        rows,
+    )
 
 
 def cost_table(cost: dict) -> list[str]:
     """CPU time, wall time and peak memory of each rule, the dearest first."""
-    rows = [[rule, str(c["jobs"]), f"{c['cpu_s']:.0f}", f"{c['wall_s']:.0f}", f"{c['max_rss_mb']:.0f}"]
-            for rule, c in sorted(cost.items(), key=lambda item: -item[1]["cpu_s"])]  # fmt: skip
+    rows = [
+        [rule, str(c["jobs"]), f"{c['cpu_s']:.0f}", f"{c['wall_s']:.0f}", f"{c['max_rss_mb']:.0f}"]
+        for rule, c in sorted(cost.items(), key=lambda item: -item[1]["cpu_s"])
+    ]
     return list_table(["rule", "jobs", "CPU, s", "wall, s", "peak memory, MB"], rows)
 
 
 def scans_table(scans: dict) -> list[str]:
     """The input files with their fingerprints."""
-    rows = [[row["path"], " x ".join(map(str, row["shape"])), row["dtype"], row["fingerprint"][:16]]
-            for row in scans["scans"]]  # fmt: skip
+    rows = [
+        [row["path"], " x ".join(map(str, row["shape"])), row["dtype"], row["fingerprint"][:16]]
+        for row in scans["scans"]
+    ]
     return list_table(["file", "shape, voxels", "type", "fingerprint"], rows)
 
 
@@ -156,6 +200,8 @@ def check_verdicts(summary: dict, strict: bool) -> None:
     """With `strict`, AddvcError when a state has failed."""
     failed = [state["label"] for state in summary["states"] if state["verdict"] == "failed"]
     if strict and failed:
-        raise AddvcError(f"strict is on and {len(failed)} of {len(summary['states'])} states failed "
-                         f"({', '.join(failed)}; at most 0): see Warnings in the report, or set "
-                         "strict: false")  # fmt: skip
+        raise AddvcError(
+            f"strict is on and {len(failed)} of {len(summary['states'])} states failed "
+            f"({', '.join(failed)}; at most 0): see Warnings in the report, or set "
+            "strict: false"
+        )

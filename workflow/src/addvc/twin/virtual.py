@@ -36,8 +36,14 @@ class VirtualField:
         strain = self.strains[state - 1]
         wave = 2 * np.pi / self.wavelength
         size = self.amplitude * strain / 0.02
-        v = size * np.stack([np.sin(wave * y[:, (d + 1) % 3] + 0.7 * d)
-                             * np.cos(wave * y[:, (d + 2) % 3] - 0.4 * d) for d in range(3)], 1)  # fmt: skip
+        v = size * np.stack(
+            [
+                np.sin(wave * y[:, (d + 1) % 3] + 0.7 * d)
+                * np.cos(wave * y[:, (d + 2) % 3] - 0.4 * d)
+                for d in range(3)
+            ],
+            1,
+        )
         v[:, self.axis] -= strain * (y[:, self.axis] - self.low)
         return v
 
@@ -64,22 +70,25 @@ class VirtualField:
         return cls(**json.loads(Path(path).read_text()))
 
 
-def warp(volume: np.ndarray, field: VirtualField, state: int, bin: int, noise: float,
-         seed: int) -> np.ndarray:  # fmt: skip
+def warp(
+    volume: np.ndarray, field: VirtualField, state: int, bin: int, noise: float, seed: int
+) -> np.ndarray:
     """Scan (nx, ny, nz) of a virtual state, in the type of `volume`, at the scan's own resolution.
 
     The reference is interpolated by cubic splines; beyond its border the nearest voxel is taken."""
     coefficients = ndimage.spline_filter(volume, 3, np.float32, mode="mirror")
     rng = np.random.default_rng([seed, state])
-    grid = np.stack(np.meshgrid(*(np.arange(n, dtype=float) for n in volume.shape[1:]),
-                                indexing="ij"), -1).reshape(-1, 2)  # fmt: skip
+    grid = np.stack(
+        np.meshgrid(*(np.arange(n, dtype=float) for n in volume.shape[1:]), indexing="ij"), -1
+    ).reshape(-1, 2)
     out = np.empty(volume.shape, volume.dtype)
     limits = np.iinfo(volume.dtype) if volume.dtype.kind in "iu" else None
     for i in range(volume.shape[0]):
         y = np.column_stack([np.full(len(grid), float(i)), grid])
         source = y - bin * field.pulled_back(to_coarse(y, bin), state)
-        grey = ndimage.map_coordinates(coefficients, source.T, order=3, prefilter=False,
-                                       mode="nearest", output=np.float32)  # fmt: skip
+        grey = ndimage.map_coordinates(
+            coefficients, source.T, order=3, prefilter=False, mode="nearest", output=np.float32
+        )
         grey += noise * rng.standard_normal(len(grey)).astype(np.float32)
         if limits is not None:
             grey = np.clip(np.rint(grey), limits.min, limits.max)

@@ -1,0 +1,214 @@
+"""Figures: what is read, cut out, projected and written, on small meshes; no stored pictures."""
+
+import csv
+
+import h5py
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from addvc.correlation.gauss_newton import Solution
+from addvc.correlation.store import save_solution
+from addvc.fem.io import write_vtu
+from addvc.fem.mesh import boundary_faces
+from addvc.images.files import write_json
+from addvc.images.scans_store import save_volume
+from addvc.report import curves, meso, scene, style, surfaces, tables
+from addvc.report.case import Case, UndeclaredInput
+
+DESCRIPTION = {"labels": {1: "3.4 %", 2: "5.2 %"}, "meso": ["meso9"], "micro": ["micro"]}
+
+
+@pytest.fixture
+def cube(box):
+    return box((0, 0, 0), (8, 10, 12), (4, 5, 6), shake=0.2)
+
+
+@pytest.fixture
+def folder(tmp_path, cube):
+    """Results of a case of one meso mesh and two states, the second not converged."""
+    rng = np.random.default_rng(1)
+    specimen = {"kind": "box", "axis": 1, "low": 0.0, "high": 10.0, "centre": [4, 6],
+                "radius": None, "bounds": [[0, 8], [0, 12]]}  # fmt: skip
+    write_json(tmp_path / "geometry/specimen.json", specimen)
+    write_json(tmp_path / "geometry/meso9.json", {"nodes": 1, "cells": 1, "mean_edge": 9.0})
+    write_vtu(tmp_path / "geometry/meso9.vtu", cube.points, cube.cells)
+    save_volume(tmp_path / "volumes/smooth0.h5", rng.random((9, 11, 13)), 20.0)
+    for name in ("meso9", "micro"):
+        for state in (1, 2):
+            result = Solution(0.01 * state * cube.points, [0.1, 1e-2 / 100**state], state == 1,
+                              residual={"mean": 0.0, "std": 1.5, "outside": 0})  # fmt: skip
+            save_solution(tmp_path / f"dvc/{name}_state{state}.h5", result)
+            write_vtu(tmp_path / f"fields/{name}_state{state}.vtu", cube.points, cube.cells,
+                      {"valid": np.full(len(cube.points), 2 - state, np.uint8)})  # fmt: skip
+            path = tmp_path / f"analysis/residual_{name}_state{state}.h5"
+            path.parent.mkdir(exist_ok=True)
+            with h5py.File(path, "w") as file:
+                file["r"] = rng.normal(0, state, 4000).astype(np.float32)
+                file["inside"], file["weight"] = np.ones(4000, bool), rng.random(4000)
+                file.attrs["std"] = float(state)
+    return tmp_path
+
+
+@pytest.fixture
+def case(folder):
+    return Case.of(DESCRIPTION | {"root": folder})
+
+
+# --------------------------------------------------------------------------- reading results
+
+
+def test_a_file_the_rule_does_not_declare_is_not_read(folder):
+    case = Case.of(DESCRIPTION | {"root": folder}, [str(folder / "geometry/meso9.vtu")])
+    case.mesh("meso9")
+    with pytest.raises(UndeclaredInput, match=r"specimen\.json is not among the 1 inputs"):
+        _ = case.specimen
+
+
+def test_titles_tell_of_loops_that_did_not_end_and_of_lost_struts(case):
+    assert case.title(1, "meso9") == "3.4 %"
+    assert case.title(2, "meso9") == "5.2 %: not converged"
+    assert case.title(2, "micro") == "5.2 %: failed"
+    assert case.shown_state() == 1
+
+
+def test_labels_survive_keys_that_are_words(folder):
+    description = DESCRIPTION | {"labels": {"2": "b", "1": "a"}, "root": folder}
+    assert Case.of(description).states == [1, 2]
+
+
+# ------------------------------------------------------------------------------ what is cut
+
+
+def test_boundary_agrees_with_the_mesh_module(cube):
+    faces, owner = surfaces.boundary(cube)
+    assert {tuple(sorted(f)) for f in faces} == {tuple(sorted(f)) for f in boundary_faces(cube)}
+    assert all(set(face) <= set(cube.cells[cell]) for face, cell in zip(faces, owner, strict=True))
+
+
+def test_boundary_of_a_part_is_closed(cube):
+    faces, _ = surfaces.boundary(cube, surfaces.centroids(cube)[:, 0] < 3)
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert (count % 2 == 0).all()
+
+
+def test_clipping_keeps_affine_fields_and_the_box(cube):
+    pytest.importorskip("pyvista")
+    low, high = np.array([1.3, 2.1, 3.7]), np.array([6.2, 8.9, 10.4])
+    slope = np.array([[1.0, 2.0], [-1.0, 0.5], [0.3, 4.0]])
+    cell = np.arange(len(cube.cells), dtype=float)
+    points, faces, found = surfaces.clipped(cube, low, high, u=cube.points @ slope, number=cell)
+    assert np.allclose(points.min(axis=0), low) and np.allclose(points.max(axis=0), high)
+    assert np.allclose(found["u"], points @ slope, atol=1e-5)
+    assert len(found["number"]) == len(faces)
+
+
+def test_segmented_ball_has_its_radius():
+    grid = np.stack(np.meshgrid(*[np.arange(21.0)] * 3, indexing="ij"), axis=-1)
+    volume = (20 - np.linalg.norm(grid - 10, axis=-1)).astype(np.float32)
+    points, _ = surfaces.segmented(volume, 14.0, np.zeros(3), np.full(3, 20.0))
+    assert np.linalg.norm(points - 10, axis=1) == pytest.approx(6, abs=0.25)
+    assert len(surfaces.segmented(volume, 99.0, np.zeros(3), np.full(3, 20.0))[1]) == 0
+
+
+# ------------------------------------------------------------------------------- what is seen
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_views_are_right_handed_with_the_loading_axis_up(axis):
+    for view in (scene.oblique(axis), scene.facing(axis, (axis + 1) % 3)):
+        frame = np.array([view.right, view.up, view.towards])
+        assert np.allclose(frame @ frame.T, np.eye(3)) and np.linalg.det(frame) > 0
+        assert view.up[axis] > 0.9 and abs(view.right[axis]) < 1e-12
+
+
+def test_a_rendering_has_its_colours_at_its_voxels():
+    points = np.array([[0, 0, 0], [10, 0, 0], [10, 0, 20], [0, 0, 20.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    view = scene.facing(2, 1)
+    colour = np.array([[255, 0, 0], [0, 0, 255]], dtype=np.uint8)
+    picture = scene.render([scene.Layer(points, faces, colour)], view, 20, margin=0.1)
+    left, right, bottom, top = picture.extent
+    rows, columns, _ = picture.image.shape
+    assert (right - left) / columns == pytest.approx((top - bottom) / rows)
+
+    def at(x, z):
+        column = int((x - left) / (right - left) * columns)
+        row = int((top - z) / (top - bottom) * rows)
+        return picture.image[row, column].astype(int)
+
+    assert at(8, 4)[0] > at(8, 4)[2] + 100 and at(2, 16)[2] > at(2, 16)[0] + 100
+    assert (at(-0.5, 10) == 255).all()
+
+
+def test_a_missing_renderer_names_the_package(monkeypatch):
+    def missing(name):
+        raise OSError(name)
+
+    scene.plotter_class.cache_clear()
+    monkeypatch.setattr(scene.sys, "platform", "linux")
+    monkeypatch.setattr(scene.ctypes, "CDLL", missing)
+    with pytest.raises(scene.AddvcError, match=r"libEGL\.so\.1.*apt install libegl1"):
+        scene.plotter_class()
+    scene.plotter_class.cache_clear()
+
+
+# ----------------------------------------------------------------------------------- style
+
+
+@pytest.mark.parametrize(("reach", "length"), [(7, 5), (19.9, 10), (20, 20), (0.3, 0.2)])
+def test_scale_bars_have_round_lengths(reach, length):
+    assert style.nice_length(reach) == pytest.approx(length)
+
+
+def test_ranges_are_symmetric_only_where_both_signs_matter():
+    values = np.linspace(-3, 5, 1001)
+    norm, cmap = style.component_range([values])
+    assert norm.vmin == -norm.vmax and cmap == style.SIGNED
+    norm, cmap = style.component_range([-np.abs(values)])
+    assert norm.vmax <= 0 and cmap.endswith("_r")
+    norm, _ = style.component_range([values], root=True)
+    assert norm(0.0) == pytest.approx(0.5) and norm(norm.vmax / 4) == pytest.approx(0.75)
+
+
+def test_saved_figures_repeat_byte_for_byte(tmp_path):
+    for run in "ab":
+        fig = style.figure(30)
+        fig.subplots().plot([1, 2])
+        style.save(fig, [tmp_path / f"{run}.png", tmp_path / f"{run}.svg"])
+    for suffix in ("png", "svg"):
+        assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
+    assert plt.get_fignums() == []
+
+
+# ---------------------------------------------------------------------------- whole figures
+
+
+def test_figures_of_a_case_with_a_failed_state_are_drawn(case, tmp_path):
+    names = [tmp_path / f"{n}.png" for n in range(4)]
+    curves.histograms(case, names[:1])
+    curves.convergence(case, names[1:2], {"meso": 1e-3, "micro": 1e-3})
+    meso.deformed(case, names[2:3])
+    meso.displacement(case, names[3:])
+    for name in names:
+        image = plt.imread(name)
+        assert image.shape[1] == pytest.approx(style.WIDTH * style.INCH * style.DPI, abs=2)
+        assert 0.001 < (image[..., :3].min(axis=-1) < 0.9).mean() < 0.9
+
+
+def test_acquisition_has_units_in_its_header(case, folder, tmp_path):
+    scan = {"shape": [144, 168, 144], "binned_shape": [72, 84, 72], "dtype": "uint16"}
+    write_json(folder / "input.json", {"scans": [scan] * 3, "voxel_size_um": 6.67, "bin": 2,
+                                       "binned_voxel_size_um": 13.34})  # fmt: skip
+    tables.acquisition(case, [tmp_path / "table.csv"], {"twin": {"seed": 7, "noise": 4.0}})
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        rows = {row["Parameter"]: row for row in csv.DictReader(file)}
+    assert rows["Number of scans"]["Value"] == "3 (1 reference + 2 loadings)"
+    assert float(rows["Memory size of one scan"]["Value"]) == pytest.approx(6.967, abs=1e-3)
+    assert rows["Noise"] == {"Parameter": "Noise", "Value": "4", "Unit": "grey level"}
+
+
+def test_mesh_without_cells_in_the_box_is_empty(cube):
+    points, faces, _ = surfaces.clipped(cube, np.full(3, 50.0), np.full(3, 60.0))
+    assert len(points) == 0 and faces.shape == (0, 3)

@@ -1,0 +1,531 @@
+# Figures and tables: one rule each, from results on disk to results/CASE/figures.
+
+FIGURE_CASE = {"root": R, "labels": LABELS, "meso": MESO, "micro": MICRO}
+FIGURES = []
+SPECIMEN = [f"{R}/geometry/specimen.json", f"{R}/geometry/threshold.json"]
+
+
+def smooth(*states):
+    """Blurred volumes of states, 0 for the reference."""
+    return expand(R + "/volumes/smooth{state}.h5", state=states)
+
+
+def meshes(*names):
+    """Meshes with their figures."""
+    return expand(R + "/geometry/{mesh}.{suffix}", mesh=names, suffix=["vtu", "json"])
+
+
+def solutions(*names):
+    """What correlation found on meshes, in every state."""
+    return expand(R + "/dvc/{mesh}_state{state}.h5", mesh=names, state=STATES)
+
+
+def residuals(*names):
+    """Residuals at the Gauss points of the micro mesh, in every state."""
+    return expand(
+        R + "/analysis/residual_{mesh}_state{state}.h5", mesh=names, state=STATES
+    )
+
+
+def fields(*names):
+    """Fields with the validity of each node, in every state."""
+    return expand(R + "/fields/{mesh}_state{state}.vtu", mesh=names, state=STATES)
+
+
+def shown(name, number, category, shows):
+    """A figure of the report and of the list of all figures, with its caption."""
+    FIGURES.append(f"{R}/figures/{name}")
+    caption = f"../report/{number}.rst"
+    words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
+    words = words.replace("table", "Table ").replace("more_", "")
+    return report(
+        FIGURES[-1],
+        category=category,
+        caption=caption,
+        labels={"figure": words, "shows": shows},
+    )
+
+
+def drawing(name):
+    """The vector version of a figure of curves, beside its picture in the report."""
+    FIGURES.append(f"{R}/figures/{name}.svg")
+    return FIGURES[-1]
+
+
+# What Fig. 15 to 17 read: both displacements on the struts, and how far to trust them.
+CARRIED = [
+    *SPECIMEN,
+    f"{R}/geometry/cell_size.json",
+    *meshes("micro"),
+    *solutions(FINEST, MICRO[0]),
+    *fields(MICRO[0]),
+    *expand(f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5", state=STATES),
+]
+
+
+rule fig03:
+    input:
+        SPECIMEN,
+        smooth(0, *STATES),
+    output:
+        shown("fig03_states.png", "fig03", "Specimen", "specimen in each state"),
+    log:
+        f"{R}/logs/figures/fig03.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig03.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 12.0),
+        runtime=15,
+    params:
+        code=code("figures/fig03.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig03.py"
+
+
+rule fig04:
+    input:
+        SPECIMEN,
+        f"{R}/geometry/cell_size.json",
+        f"{R}/volumes/volume0.h5",
+    output:
+        shown("fig04_cell_size.png", "fig04", "Specimen", "cell size"),
+        drawing("fig04_cell_size"),
+    log:
+        f"{R}/logs/figures/fig04.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig04.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 4.0),
+        runtime=10,
+    params:
+        code=code("figures/fig04.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig04.py"
+
+
+rule fig05:
+    input:
+        SPECIMEN,
+        meshes(*MESO),
+    output:
+        shown("fig05_meso_meshes.png", "fig05", "Meshes", "meso meshes"),
+    log:
+        f"{R}/logs/figures/fig05.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig05.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 10.0),
+        runtime=10,
+    params:
+        code=code("figures/fig05.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig05.py"
+
+
+rule fig06:
+    input:
+        SPECIMEN,
+        smooth(0),
+        f"{R}/geometry/grid.vtu",
+    output:
+        shown("fig06_platen_grid.png", "fig06", "Meshes", "platen grid"),
+    log:
+        f"{R}/logs/figures/fig06.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig06.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 12.0),
+        runtime=10,
+    params:
+        code=code("figures/fig06.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig06.py"
+
+
+rule fig07:
+    input:
+        SPECIMEN,
+        f"{R}/volumes/volume0.h5",
+    output:
+        shown("fig07_blur.png", "fig07", "Specimen", "effect of the blur"),
+    log:
+        f"{R}/logs/figures/fig07.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig07.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 4.0),
+        runtime=10,
+    params:
+        code=code("figures/fig07.py"),
+        case=FIGURE_CASE,
+        sigma=config["images"]["blur"],
+    script:
+        "../scripts/figures/fig07.py"
+
+
+rule fig08:
+    input:
+        SPECIMEN,
+        smooth(0),
+        f"{R}/geometry/cell_size.json",
+        f"{R}/geometry/region.json",
+        meshes("micro"),
+    output:
+        shown("fig08_region.png", "fig08", "Meshes", "region and its mesh"),
+    log:
+        f"{R}/logs/figures/fig08.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig08.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 15.0),
+        runtime=10,
+    params:
+        code=code("figures/fig08.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig08.py"
+
+
+rule fig09:
+    input:
+        SPECIMEN,
+        smooth(0),
+        meshes("micro"),
+    output:
+        shown("fig09_penalised.png", "fig09", "Meshes", "penalised nodes"),
+    log:
+        f"{R}/logs/figures/fig09.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig09.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 15.0),
+        runtime=10,
+    params:
+        code=code("figures/fig09.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig09.py"
+
+
+rule table1:
+    input:
+        SPECIMEN,
+        f"{R}/input.json",
+    output:
+        shown("table1_acquisition.csv", "table1", "Tables", "scans"),
+    log:
+        f"{R}/logs/figures/table1.log",
+    benchmark:
+        f"{R}/benchmarks/figures/table1.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 1.0),
+        runtime=5,
+    params:
+        code=code("figures/table1.py"),
+        case=FIGURE_CASE,
+        config={
+            key: config[key] for key in ("scans", "twin", "virtual") if key in config
+        },
+    script:
+        "../scripts/figures/table1.py"
+
+
+rule table2:
+    input:
+        SPECIMEN,
+        f"{R}/input.json",
+        f"{R}/geometry/cell_size.json",
+        meshes(*MESO, "micro"),
+        solutions(*MESO, *MICRO),
+        expand(R + "/analysis/ultimate_{mesh}.json", mesh=[*MESO, *MICRO]),
+    output:
+        shown("table2_parameters.csv", "table2", "Tables", "parameters"),
+    log:
+        f"{R}/logs/figures/table2.log",
+    benchmark:
+        f"{R}/benchmarks/figures/table2.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 1.0),
+        runtime=5,
+    params:
+        code=code("figures/table2.py"),
+        case=FIGURE_CASE,
+        config={key: config[key] for key in ("images", "meso", "micro")},
+        methods=settings.micro_names(config),
+    script:
+        "../scripts/figures/table2.py"
+
+
+if STATES:
+
+    rule fig10:
+        input:
+            SPECIMEN,
+            meshes(*MESO),
+            solutions(*MESO),
+        output:
+            shown(
+                "fig10_meso_deformed.png",
+                "fig10",
+                "Mesoscale DVC",
+                "deformed meshes, sigma(r)",
+            ),
+        log:
+            f"{R}/logs/figures/fig10.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig10.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 10.0),
+            runtime=15,
+        params:
+            code=code("figures/fig10.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig10.py"
+
+    rule fig11:
+        input:
+            SPECIMEN,
+            smooth(0),
+            meshes(FINEST),
+            solutions(FINEST),
+        output:
+            shown(
+                "fig11_meso_displacement.png", "fig11", "Mesoscale DVC", "displacement"
+            ),
+        log:
+            f"{R}/logs/figures/fig11.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig11.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 10.0),
+            runtime=15,
+        params:
+            code=code("figures/fig11.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig11.py"
+
+    rule fig12:
+        input:
+            residuals(FINEST, *MICRO),
+            solutions(FINEST, *MICRO),
+            fields(*MICRO),
+        output:
+            shown(
+                "fig12_histograms.png",
+                "fig12",
+                "Microscale DVC",
+                "histograms of the residual",
+            ),
+            drawing("fig12_histograms"),
+        log:
+            f"{R}/logs/figures/fig12.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig12.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1000, 4.0),
+            runtime=10,
+        params:
+            code=code("figures/fig12.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig12.py"
+
+    rule fig13:
+        input:
+            SPECIMEN,
+            smooth(0),
+            meshes("micro"),
+            residuals(FINEST, *MICRO),
+            solutions(FINEST, *MICRO),
+            fields(*MICRO),
+        output:
+            shown("fig13_residual_maps.png", "fig13", "Microscale DVC", "residual maps"),
+        log:
+            f"{R}/logs/figures/fig13.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig13.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 6.0),
+            runtime=15,
+        params:
+            code=code("figures/fig13.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig13.py"
+
+    rule fig15:
+        input:
+            CARRIED,
+            smooth(0),
+        output:
+            shown(
+                "fig15_fields.png",
+                "fig15",
+                "Microscale DVC",
+                "displacement and strain",
+            ),
+        log:
+            f"{R}/logs/figures/fig15.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig15.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 10.0),
+            runtime=15,
+        params:
+            code=code("figures/fig15.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig15.py"
+
+    rule fig16:
+        input:
+            CARRIED,
+            smooth(0, *STATES),
+        output:
+            shown(
+                "fig16_warp.png",
+                "fig16",
+                "Microscale DVC",
+                "reference on the deformed image",
+            ),
+        log:
+            f"{R}/logs/figures/fig16.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig16.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 10.0),
+            runtime=15,
+        params:
+            code=code("figures/fig16.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig16.py"
+
+    rule fig17:
+        input:
+            CARRIED,
+            smooth(0, *STATES),
+            f"{R}/geometry/region.json",
+        output:
+            shown("fig17_zoom.png", "fig17", "Microscale DVC", "close-ups"),
+        log:
+            f"{R}/logs/figures/fig17.log",
+        benchmark:
+            f"{R}/benchmarks/figures/fig17.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 10.0),
+            runtime=15,
+        params:
+            code=code("figures/fig17.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/fig17.py"
+
+    rule more_convergence:
+        input:
+            solutions(*MESO, *MICRO),
+        output:
+            shown("more_convergence.png", "more_convergence", "Quality", "convergence"),
+            drawing("more_convergence"),
+        log:
+            f"{R}/logs/figures/more_convergence.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_convergence.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=10,
+        params:
+            code=code("figures/more_convergence.py"),
+            case=FIGURE_CASE,
+            tolerance={name: config[name]["tolerance"] for name in ("meso", "micro")},
+        script:
+            "../scripts/figures/more_convergence.py"
+
+
+if STATES and HAS_TRUTH:
+
+    rule more_error:
+        input:
+            smooth(0),
+            solutions(*MESO, *MICRO),
+            fields(*MICRO),
+            expand(
+                R + "/analysis/error_{mesh}_state{state}.json",
+                mesh=[*MESO, *MICRO],
+                state=STATES,
+            ),
+        output:
+            shown("more_error.png", "more_error", "Quality", "error against the truth"),
+            drawing("more_error"),
+        log:
+            f"{R}/logs/figures/more_error.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_error.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=10,
+        params:
+            code=code("figures/more_error.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_error.py"

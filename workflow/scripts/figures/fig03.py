@@ -1,0 +1,9 @@
+"""Fig. 3: the segmented foam in every state."""
+
+from addvc.report.anatomy import states
+from addvc.report.case import Case
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    states(case, snakemake.output)

@@ -1,0 +1,9 @@
+"""Fig. 4: the cell size and a slice."""
+
+from addvc.report.case import Case
+from addvc.report.curves import cell_size
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    cell_size(case, snakemake.output)

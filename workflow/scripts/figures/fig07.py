@@ -1,0 +1,9 @@
+"""Fig. 7: what the blur does to the surface."""
+
+from addvc.report.anatomy import blur
+from addvc.report.case import Case
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    blur(case, snakemake.output, snakemake.params.sigma)

@@ -1,0 +1,9 @@
+"""Fig. 9: nodes with penalised curvature."""
+
+from addvc.report.anatomy import penalised
+from addvc.report.case import Case
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    penalised(case, snakemake.output)

@@ -1,0 +1,9 @@
+"""Fig. 16: the reference carried onto the deformed image."""
+
+from addvc.report.case import Case
+from addvc.report.warp import warped
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    warped(case, snakemake.output)

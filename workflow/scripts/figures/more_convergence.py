@@ -1,0 +1,9 @@
+"""rms(du) of every iteration."""
+
+from addvc.report.case import Case
+from addvc.report.curves import convergence
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    convergence(case, snakemake.output, snakemake.params.tolerance)

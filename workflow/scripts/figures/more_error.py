@@ -1,0 +1,9 @@
+"""Errors against the truth."""
+
+from addvc.report.case import Case
+from addvc.report.curves import errors
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    errors(case, snakemake.output)

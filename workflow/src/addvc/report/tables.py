@@ -1,0 +1,141 @@
+"""Tables 1 and 2 as CSV: the scans, and the parameters of every correlation."""
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+from addvc.correlation.meso import meso_options
+from addvc.correlation.micro import micro_options
+from addvc.images.files import atomic_path
+from addvc.report.case import Case
+
+Rows = list[list[str]]
+TWIN = {
+    "seed": ("Seed of the synthetic test", "–"),
+    "noise": ("Noise", "grey level"),
+    "psf": ("Blur of the scanner (standard deviation)", "voxel of the scan"),
+    "cupping": ("Cupping (relative)", "–"),
+    "rings": ("Ring artefacts", "grey level"),
+    "drift": ("Drift of brightness (relative)", "–"),
+}
+
+
+def write_table(path: str | Path, rows: Rows) -> None:
+    """CSV in UTF-8, the first row its header."""
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
+
+
+def acquisition(case: Case, outputs: Iterable[str], config: dict) -> None:
+    """Table 1: what was scanned and how, as far as files and configuration say."""
+    scans = case.json("input.json")
+    first, count = scans["scans"][0], len(case.states)
+    rows = [
+        ["Parameter", "Value", "Unit"],
+        [
+            "Source",
+            "synthetic test"
+            if "twin" in config
+            else "reference scan, deformed by a known field"
+            if "virtual" in config
+            else "scans",
+            "–",
+        ],
+        ["Number of scans", f"{count + 1} (1 reference + {count} loadings)", "–"],
+        ["Definition", times(first["shape"]), "voxel"],
+        ["Voxel size", f"{scans['voxel_size_um']:g}", "µm"],
+        ["Encoding", str(first["dtype"]), "–"],
+        ["Memory size of one scan", f"{memory(first):.4g}", "MB"],
+        ["Binning", f"{scans['bin']:g}", "–"],
+        ["Definition after binning", times(first["binned_shape"]), "voxel"],
+        ["Voxel size after binning", f"{scans['binned_voxel_size_um']:g}", "µm"],
+        ["Loading axis", "xyz"[case.specimen.axis], "–"],
+    ]
+    rows += [
+        [name, f"{config['twin'][key]:g}", unit]
+        for key, (name, unit) in TWIN.items()
+        if key in config.get("twin", {})
+    ]
+    for path in outputs:
+        write_table(path, rows)
+
+
+def memory(scan: dict) -> float:
+    """Megabytes of a scan once it is read: the file may be compressed."""
+    bits = "".join(c for c in str(scan["dtype"]) if c.isdigit()) or "8"
+    x, y, z = scan["shape"]
+    return x * y * z * int(bits) / 8 / 1e6
+
+
+def times(shape: Iterable[int]) -> str:
+    return " × ".join(str(n) for n in shape)
+
+
+def parameters(case: Case, outputs: Iterable[str], config: dict, methods: dict[str, str]) -> None:
+    """Table 2: size, functional, lengths, error and cost of each mesh, a column a mesh."""
+    names = [*case.meso, *case.micro]
+    columns = {name: _column(case, name, config, methods) for name in names}
+    keys = list(columns[names[0]])
+    rows = [["Parameter", *names]]
+    rows += [[key, *(columns[name][key] for name in names)] for key in keys]
+    for path in outputs:
+        write_table(path, rows)
+
+
+def _column(case: Case, name: str, config: dict, methods: dict[str, str]) -> dict[str, str]:
+    """Parameters of one mesh by name, each with its unit."""
+    facts, micro = case.mesh_facts(name), name in case.micro
+    image = case.json("input.json")["scans"][0]["binned_shape"]
+    given = _micro(case, config, methods[name]) if micro else _meso(case, name, config)
+    shared = {
+        "Ultimate error (voxels)": _ultimate(case, name),
+        "FE type": "4-node tetrahedron (Lagrange)",
+        "Nodes": str(facts["nodes"]),
+        "Elements": str(facts["cells"]),
+        "Mesh geometry": "Fig. 8" if micro else "Fig. 5",
+        "Image definition (voxels)": times(image),
+        "Sub-voxel evaluation": "cubic B-spline (Eq. 4)",
+        "Gaussian pre-filter, standard deviation (voxels, Eq. 8)": f"{config['images']['blur']:g}",
+    }
+    edge = {"Mean element length (voxels)": f"{facts['mean_edge']:.2f}"}
+    return edge | given | shared | _outcome(case, name)
+
+
+def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
+    """Functional, length and start of a meso mesh."""
+    coarsest = name == case.meso[0]
+    options = meso_options(config["meso"], case.mesh_facts(name)["mean_edge"], 0, coarsest)
+    before = case.meso[max(case.meso.index(name) - 1, 0)]
+    return {
+        "Matching functional": "Eq. 2" if options.cutoff == 0 else "Eq. 9 with T = L",
+        "Regularisation length (voxels)": f"l_L = {options.cutoff:.3g}",
+        "Initialisation": "coarse to fine" if coarsest else f"solution of {before}",
+    }
+
+
+def _micro(case: Case, config: dict, method: str) -> dict[str, str]:
+    """Functional, lengths and start of a micro method."""
+    options = micro_options(config["micro"], case.cell_size, case.specimen.axis)
+    functional = "Eq. 10" if method == "eq10" else method
+    return {
+        "Matching functional": functional,
+        "Regularisation length (voxels)": f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}",
+        "Initialisation": f"solution of {case.finest}",
+    }
+
+
+def _ultimate(case: Case, name: str) -> str:
+    value = case.json(f"analysis/ultimate_{name}.json").get("ultimate_error")
+    return "–" if value is None else f"{value:.2e}"
+
+
+def _outcome(case: Case, name: str) -> dict[str, str]:
+    """Iterations and sigma(r) on the mesh's own points, a row a state."""
+    rows = {}
+    for state in case.states:
+        solution = case.solution(name, state)
+        mark = "" if solution.converged else " (not converged)"
+        label = case.labels[state]
+        rows[f"Iterations, {label}"] = f"{solution.iterations}{mark}"
+        rows[f"σ(r), {label} (grey levels)"] = f"{solution.residual['std']:.3f}"
+    return rows
