@@ -193,7 +193,8 @@ def test_figures_of_a_case_with_a_failed_state_are_drawn(case, tmp_path):
     meso.displacement(case, names[3:])
     for name in names:
         image = plt.imread(name)
-        assert image.shape[1] == pytest.approx(style.WIDTH * style.INCH * style.DPI, abs=2)
+        page = np.array([style.HEIGHT, style.WIDTH]) * style.INCH * style.DPI
+        assert (image.shape[:2] <= page + 2).all()
         assert 0.001 < (image[..., :3].min(axis=-1) < 0.9).mean() < 0.9
 
 

@@ -84,16 +84,26 @@ def state_figures(
             "error": read_json(errors) if errors.exists() else None,
         }
     points, _, point, _ = read_vtu(folder / f"fields/{finest}_state{state}.vtu")
-    slope = np.polyfit(points[:, axis], point["displacement"][:, axis], 1)[0]
+    strain = shortening(points[:, axis], point["displacement"][:, axis])
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
     return result | {
-        "strain": float(-slope),
+        "strain": strain,
         "start": notes["best"],
         "candidates": notes["candidates"],
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": None,
     }
+
+
+def shortening(position: np.ndarray, displacement: np.ndarray) -> float:
+    """Overall compression: by how much the two end faces (a twentieth of the height) come nearer,
+    over their distance; coordinates (n,) along the loading axis, voxels."""
+    low, high = position.min(), position.max()
+    near = 0.05 * (high - low)
+    bottom, top = position <= low + near, position >= high - near
+    closer = np.median(displacement[bottom]) - np.median(displacement[top])
+    return float(closer / (np.median(position[top]) - np.median(position[bottom])))
 
 
 def costs(folder: Path) -> dict:

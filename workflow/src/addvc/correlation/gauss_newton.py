@@ -35,15 +35,17 @@ def gauss_newton(
     max_iterations: int = 50,
     progress: Callable[[int, float], None] = lambda iteration, step: None,
 ) -> Solution:
-    """u <- u + A^-1 b(u) until rms(du) < tolerance (voxels); u (n, 3), b flattened (3 n,)."""
+    """u <- u + A^-1 b(u) until rms(du) < tolerance (voxels); u (n, 3), b flattened (3 n,).
+
+    A step that is not finite is not taken, and ends the loop without convergence."""
     start, history = time.perf_counter(), []
     for iteration in range(1, max_iterations + 1):
         du = solve(right_hand_side(u)).reshape(u.shape)
-        u = u + du
         history.append(rms(du))
         progress(iteration, history[-1])
-        if history[-1] < tolerance:
-            return Solution(u, history, True, time.perf_counter() - start)
         if not np.isfinite(history[-1]):
             break
+        u = u + du
+        if history[-1] < tolerance:
+            return Solution(u, history, True, time.perf_counter() - start)
     return Solution(u, history, False, time.perf_counter() - start)

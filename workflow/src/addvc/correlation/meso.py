@@ -170,12 +170,11 @@ def best_start(
                 "iterations": solution.iterations,
             }
         )
-    usable = [row for row in table if np.isfinite(row["residual_std"])]
-    best = min(
-        usable,
-        key=lambda row: (
-            row["outside"] > 0.2 * len(system.reference.quadrature),
-            row["residual_std"],
-        ),
-    )["candidate"]
+    many = 0.2 * len(system.reference.quadrature)
+
+    def rank(row):
+        known = np.isfinite(row["residual_std"])
+        return (not known, row["outside"] > many, row["residual_std"])
+
+    best = min(table, key=rank)["candidate"]
     return best, tried[best], table

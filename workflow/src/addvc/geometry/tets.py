@@ -80,25 +80,22 @@ def largest_piece(mesh: Mesh) -> tuple[Mesh, dict]:
 
 
 def sized(surface: Surface, size: float, attempts: int = 8, tolerance: float = 0.04) -> Mesh:
-    """A mesh whose mean edge is `size` voxels within `tolerance` (relative), by secant steps.
+    """A mesh whose mean edge is `size` voxels within `tolerance` (relative), or the nearest tried.
 
-    The best of `attempts` is kept and logged: the mesher's response is not linear."""
-    asked, best = size, None
+    The mesher's response is not linear: the length asked for is scaled by the miss until sizes on
+    both sides are known, then bisected."""
+    asked, tried = size, []
     for _ in range(attempts):
-        mesh = tetrahedralise(
-            surface,
-            TetOptions(asked, envelope=0.05 * size, passes=40, stop_energy=10.0, coarsen=True),
-        )
-        measured = mean_edge_length(mesh)
+        options = TetOptions(asked, 0.05 * size, stop_energy=10.0, passes=40, coarsen=True)
+        mesh = tetrahedralise(surface, options)
+        edge = mean_edge_length(mesh)
+        tried.append((abs(edge - size), asked, edge, mesh))
         log.info(
-            "asked for edges of %.2f voxels: %d tets, mean edge %.2f",
-            asked,
-            len(mesh.cells),
-            measured,
+            "asked for edges of %.2f voxels: %d tets, mean edge %.2f", asked, len(mesh.cells), edge
         )
-        if best is None or abs(measured - size) < abs(best[0] - size):
-            best = measured, mesh
-        if abs(measured - size) < tolerance * size:
+        if abs(edge - size) < tolerance * size:
             break
-        asked *= size / measured
-    return best[1]
+        short = [a for _, a, found, _ in tried if found < size]
+        long = [a for _, a, found, _ in tried if found >= size]
+        asked = np.sqrt(max(short) * min(long)) if short and long else asked * size / edge
+    return min(tried, key=lambda one: one[0])[3]

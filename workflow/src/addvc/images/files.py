@@ -1,6 +1,7 @@
 """Files on disk: whole or not there at all."""
 
 import json
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,9 +27,10 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def write_json(path: str | Path, data: object) -> None:
-    """JSON with two-space indents, written to a temporary name and then renamed."""
+    """JSON with two-space indents, written to a temporary name and then renamed; nan is null."""
     with atomic_path(path) as temporary:
-        Path(temporary).write_text(json.dumps(data, indent=2, default=_plain) + "\n")
+        text = json.dumps(_known(data), indent=2, allow_nan=False)
+        Path(temporary).write_text(text + "\n")
 
 
 def read_json(path: str | Path) -> dict:
@@ -36,8 +38,14 @@ def read_json(path: str | Path) -> dict:
     return json.loads(Path(path).read_text())
 
 
-def _plain(value: object) -> object:
-    """numpy scalars and arrays as JSON knows them."""
+def _known(value: object) -> object:
+    """Data as JSON has it: numpy scalars and arrays as numbers and lists, nan and inf as null."""
+    if isinstance(value, dict):
+        return {key: _known(item) for key, item in value.items()}
     if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} cannot be written as JSON")
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_known(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -30,6 +30,7 @@ def states(case: Case, outputs: Iterable[str]) -> None:
     foams = [_foam(case, n) for n in numbers]
     view = oblique(case.specimen.axis)
     fit = np.vstack([points for points, _ in foams])
+    fit = fit[in_box(fit, *np.percentile(fit, (0.2, 99.8), axis=0))]  # specks of noise left out
     fig, axes = style.panels(1, len(numbers), aspect(view, fit))
     for panel, (ax, state, foam) in enumerate(zip(axes[0], numbers, foams, strict=True)):
         render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
@@ -63,7 +64,7 @@ def meso_meshes(case: Case, outputs: Iterable[str]) -> None:
             f"mean edge {facts['mean_edge']:.1f} voxels\n{facts['nodes']:,} nodes\n"
             f"{facts['cells']:,} tetrahedra"
         )
-        ax.text(0.5, -0.03, text, transform=ax.transAxes, ha="center", va="top")
+        style.note(ax, text, y=-0.03)
     style.save(fig, outputs)
 
 
@@ -80,59 +81,62 @@ def _opened(mesh: Mesh, view: View, axis: int) -> Layer:
 
 def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
     """Fig. 7: surface of a crop of 50 voxels a side without blur, with Eq. 8, and with 2 voxels."""
-    volume, voxel_um = case.image(0, smooth=False)
-    specimen = case.specimen
-    middle = np.array(volume.shape) / 2
-    middle[specimen.axis] = (specimen.low + specimen.high) / 2
-    middle[list(specimen.across)] = specimen.centre
-    low = np.maximum(np.round(middle).astype(int) - 25, 0)
-    crop = volume[tuple(slice(a, a + 50) for a in low)]
+    crop, voxel_um = _crop(case)
     share = float(np.mean(gaussian_blur(crop, sigma) > case.gamma))
+    widths = {
+        "no blur": 0.0,
+        f"σ = {sigma:g} voxels (used)": sigma,
+        f"σ = {max(2.0, 2 * sigma):g} voxels (exaggerated)": max(2.0, 2 * sigma),
+    }
     fig = style.figure(70)
     axes = fig.subplots(1, 3)
     cube = box_corners(np.zeros(3), np.array(crop.shape) - 1.0)
-    for panel, (ax, width) in enumerate(zip(axes, (0.0, sigma, 2.0), strict=True)):
+    for panel, (ax, (title, width)) in enumerate(zip(axes, widths.items(), strict=True)):
         grey = gaussian_blur(crop, width)
         gamma = float(np.quantile(grey, 1 - share)) if width > sigma else case.gamma
-        points, faces = segmented(grey, gamma, np.zeros(3), np.array(crop.shape))
-        render([Layer(points, faces)], oblique(specimen.axis), 56, cube, True).show(ax)
-        extra = {0.0: "no blur", sigma: f"σ = {sigma:g} voxels (used)"}
-        style.headline(ax, extra.get(width, f"σ = {width:g} voxels (exaggerated)"), panel)
+        body = segmented(grey, gamma, np.zeros(3), np.array(crop.shape))
+        render([Layer(*body)], oblique(case.specimen.axis), 56, cube, True).show(ax)
+        style.headline(ax, title, panel)
     style.scale_bar(axes[0], voxel_um)
     style.save(fig, outputs)
 
 
+def _crop(case: Case) -> tuple[np.ndarray, float]:
+    """50 voxels a side in the middle of the specimen, not blurred, and the voxel size."""
+    volume, voxel_um = case.image(0, smooth=False)
+    specimen = case.specimen
+    middle = np.empty(3)
+    middle[specimen.axis] = (specimen.low + specimen.high) / 2
+    middle[list(specimen.across)] = specimen.centre
+    low = np.maximum(np.round(middle).astype(int) - 25, 0)
+    return volume[tuple(slice(a, a + 50) for a in low)], voxel_um
+
+
 def region(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 8: (a) the region in the whole foam, (b) its mesh close up."""
-    volume, voxel_um = case.image(0)
-    specimen, limits = case.specimen, Region(**case.json("geometry/region.json"))
-    view = oblique(specimen.axis)
-    fig = style.figure(92)
+    mesh, facts = case.mesh("micro"), case.mesh_facts("micro")
+    view = oblique(case.specimen.axis)
+    fig = style.figure(96)
     left, right = fig.subplots(1, 2)
-    points, faces = whole_foam(volume, case.gamma, specimen, specimen.low, specimen.high)
-    ends, sides = caps_depth(limits, points[faces].mean(axis=1))
-    outside = np.minimum(ends, sides) < 0
-    mesh = case.mesh("micro")
-    chosen, _ = boundary(mesh)
-    layers = [Layer(points, faces[outside]), Layer(mesh.points, chosen, style.BLUE)]
+    layers = [_outside(case), Layer(mesh.points, boundary(mesh)[0], style.BLUE)]
     render(layers, view, 80, shadows=True).show(left)
-    style.scale_bar(left, voxel_um)
     style.headline(left, "region (blue) in the foam (grey)", 0)
     _close_up(right, mesh, case, view)
-    style.scale_bar(right, voxel_um)
-    facts = case.mesh_facts("micro")
     style.headline(right, "its mesh close up", 1)
-    right.text(
-        1,
-        -0.02,
-        f"{facts['nodes']:,} nodes\n{facts['cells']:,} tetrahedra\n"
-        f"of {facts['mean_volume']:.2f} voxel³ in the mean",
-        transform=right.transAxes,
-        ha="right",
-        va="top",
-        fontsize=8,
-    )
+    for ax in (left, right):
+        style.scale_bar(ax, case.voxel_um())
+    counts = f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra"
+    text = f"{counts} of {facts['mean_volume']:.2f} voxel³"
+    style.note(right, text, 0, -0.11, ha="left", fontsize=8)
     style.save(fig, outputs)
+
+
+def _outside(case: Case) -> Layer:
+    """The foam that is not in the region of micro DVC."""
+    specimen, limits = case.specimen, Region(**case.json("geometry/region.json"))
+    points, faces = whole_foam(case.image(0)[0], case.gamma, specimen, specimen.low, specimen.high)
+    depth = np.minimum(*caps_depth(limits, points[faces].mean(axis=1)))
+    return Layer(points, faces[depth < 0])
 
 
 def _close_up(ax, mesh, case: Case, view) -> None:

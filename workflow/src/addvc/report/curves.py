@@ -29,7 +29,6 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
     radius, curve = np.array(found["radius"]), np.array(found["correlation"])
     size = found["cell_size"]
     ax.plot(radius, curve, color=style.DARK)
-    ax.axhline(0, color="#999999", lw=0.6, zorder=0)
     measured = found["source"] == "measured"
     name = "cell size" if measured else "cell size, as configured"
     text = f"{name}\n{size:.1f} voxels = {size * voxel_um:.0f} µm"
@@ -41,14 +40,9 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
     tail = curve[radius > 0.3 * size]
     reach = max(tail.max() - min(tail.min(), 0), 0.02)
     ax.set_ylim(min(tail.min(), 0) - 0.2 * reach, at + 2.6 * reach)
-    ax.annotate(
-        text,
-        (size, at),
-        (0.52, 0.72),
-        textcoords="axes fraction",
-        color=style.RED,
-        arrowprops={"arrowstyle": "-", "color": style.RED, "lw": 0.7},
-    )
+    arrow = {"arrowstyle": "-", "color": style.RED, "lw": 0.7}
+    where = {"textcoords": "axes fraction", "color": style.RED, "arrowprops": arrow}
+    ax.annotate(text, (size, at), (0.52, 0.72), **where)
     ax.set(xlabel="radius (voxels)", ylabel="normalised autocorrelation (–)", xlim=(0, radius[-1]))
     top = ax.secondary_xaxis("top", functions=(lambda x: x * voxel_um, lambda x: x / voxel_um))
     top.set_xlabel("radius (µm)")
@@ -124,10 +118,8 @@ def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float])
     for ax in axes[::columns]:
         ax.set_ylabel("rms(du) (voxels)")
     handles = [style.line(style.SERIES[(n - 1) % 6], case.labels[n]) for n in case.states]
-    handles += [
-        style.line("#777777", "criterion", ls=":"),
-        style.line(style.RED, "not converged", ls="", marker="x"),
-    ]
+    handles.append(style.line("#777777", "criterion", ls=":"))
+    handles.append(style.line(style.RED, "not converged", ls="", marker="x"))
     fig.legend(handles=handles, loc="outside lower center", ncols=6)
     style.save(fig, outputs)
 
@@ -145,38 +137,49 @@ def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
 def errors(case: Case, outputs: Iterable[str]) -> None:
     """Error against the truth at the micro nodes: rms with p95, and its parts at each strut."""
     names = [*case.meso, *case.micro]
-    fig = style.figure(88)
-    axes = fig.subplots(1, 2, sharey=True)
+    fig, axes = _error_panels(case, names)
+    for place, name in enumerate(names):
+        for column, state in enumerate(case.states):
+            found = case.json(f"analysis/error_{name}_state{state}.json")
+            x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
+            _error(axes, x, found, place, not case.status(name, state))
+    low, high = axes[0].get_ylim()
+    if high < 20 * low:
+        axes[0].yaxis.set_minor_formatter("{x:.2g}")
+    handles = [
+        style.line(style.SERIES[n % 6], name, ls="", marker=style.MARKERS[n % 6])
+        for n, name in enumerate(names)
+    ]
+    handles.append(style.line("#555555", "p95 / along the strut", ls="", marker="_"))
+    handles.append(style.line(style.RED, "failed or not converged", ls="", marker="x"))
+    fig.legend(handles=handles, loc="outside lower center", ncols=2 * len(axes))
+    style.save(fig, outputs)
+
+
+def _error_panels(case: Case, names: list[str]) -> tuple:
+    """The figure and its empty panels, logarithmic, a tick a state; the second where the truth knows
+    the direction of the struts."""
+    known = [
+        case.json(f"analysis/error_{name}_state{n}.json") for name in names for n in case.states
+    ]
+    count = 2 if any(found.get("rms_normal") is not None for found in known) else 1
+    fig = style.figure(88, 85 * count)
+    axes = fig.subplots(1, count, sharey=True, squeeze=False)[0]
     titles = "whole error: rms, and p95 above it", "rms normal to the strut, and along it"
-    for number, (ax, text) in enumerate(zip(axes, titles, strict=True)):
+    for number, (ax, text) in enumerate(zip(axes, titles, strict=False)):
         style.headline(ax, text, number)
         ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
         ax.set_xticklabels([case.labels[n] for n in case.states])
         ax.yaxis.set_major_formatter("{x:g}")
         ax.grid(axis="y", which="both", lw=0.3, color="#dddddd")
-    for place, name in enumerate(names):
-        for column, state in enumerate(case.states):
-            found = case.json(f"analysis/error_{name}_state{state}.json")
-            if found:
-                x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
-                _error(axes, x, found, place, not case.status(name, state))
     axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")
-    handles = [
-        style.line(style.SERIES[n % 6], name, ls="", marker=style.MARKERS[n % 6])
-        for n, name in enumerate(names)
-    ]
-    handles += [
-        style.line("#555555", "p95 / along the strut", ls="", marker="_"),
-        style.line(style.RED, "failed or not converged", ls="", marker="x"),
-    ]
-    fig.legend(handles=handles, loc="outside lower center", ncols=-(-len(handles) // 2))
-    style.save(fig, outputs)
+    return fig, axes
 
 
 def _error(axes, x: float, found: dict, place: int, good: bool) -> None:
     """Marks of one result in both panels."""
     colour, marker = style.SERIES[place % 6], style.MARKERS[place % 6]
-    for ax, main, other in ((axes[0], "rms", "p95"), (axes[1], "rms_normal", "rms_along")):
+    for ax, main, other in zip(axes, ("rms", "rms_normal"), ("p95", "rms_along"), strict=False):
         if found.get(main) is None:
             continue
         ax.plot([x, x], [found[main], found[other]], color=colour, lw=0.8)

@@ -17,41 +17,33 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     faces, owner = boundary(mesh)
     view = oblique(case.specimen.axis)
     values = {
-        (name, n): _cell_residual(case, name, n)[owner] for name in names for n in case.states
+        (name, n): _cell_residual(case, name, n, len(mesh.cells))[owner]
+        for name in names
+        for n in case.states
     }
-    usable = [v for (name, n), v in values.items() if not case.status(name, n)]
-    norm = style.robust_range(usable or list(values.values()), signed=True, share=1)
-    columns = len(case.states)
+    norm, columns = _residual_range(case, values), len(case.states)
     fig, axes = style.panels(len(names), columns, aspect(view, mesh.points), 8, 18, below=6)
-    for row, name in enumerate(names):
-        for column, state in enumerate(case.states):
-            layer = Layer(
-                mesh.points, faces, values=values[name, state], norm=norm, cmap=style.SIGNED
-            )
-            ax = axes[row, column]
-            render([layer], view, 150 / columns).show(ax)
-            style.headline(ax, case.title(state, name), row * columns + column)
-            if column == 0:
-                ax.text(
-                    -0.03,
-                    0.5,
-                    name,
-                    transform=ax.transAxes,
-                    rotation=90,
-                    ha="right",
-                    va="center",
-                    fontsize=9,
-                )
+    for panel, ((name, state), r) in enumerate(values.items()):
+        layer = Layer(mesh.points, faces, values=r, norm=norm, cmap=style.SIGNED)
+        render([layer], view, 150 / columns).show(axes.flat[panel])
+        style.headline(axes.flat[panel], case.title(state, name), panel)
+    for ax, name in zip(axes[:, 0], names, strict=True):
+        style.row_name(ax, name)
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
     label = "residual r (grey levels)"
     style.colour_bar(fig, axes, norm, style.SIGNED, label, shrink=0.7, aspect=30)
     style.save(fig, outputs)
 
 
-def _cell_residual(case: Case, name: str, state: int) -> np.ndarray:
+def _residual_range(case: Case, values: dict) -> style.Normalize:
+    """About zero, from the results that are right where there are any."""
+    usable = [r for (name, state), r in values.items() if not case.status(name, state)]
+    return style.robust_range(usable or list(values.values()), signed=True, share=1)
+
+
+def _cell_residual(case: Case, name: str, state: int, cells: int) -> np.ndarray:
     """Weighted mean of r over the Gauss points of each micro cell (m,); 0 outside of the image."""
     r, weight, _ = case.residual(name, state)
-    cells = len(case.mesh("micro").cells)
     total = (r * weight).reshape(cells, -1).sum(axis=1)
     return total / np.maximum(weight.reshape(cells, -1).sum(axis=1), 1e-12)
 

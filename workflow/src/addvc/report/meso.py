@@ -20,33 +20,15 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
     fit, view = _reach(meshes[-1]), oblique(case.specimen.axis)
     fig, axes = style.panels(rows, columns, aspect(view, fit))
     for row, (name, mesh) in enumerate(zip(case.meso, meshes, strict=True)):
+        faces, _ = boundary(mesh)
         for column, state in enumerate(case.states):
-            solution = case.solution(name, state)
+            solution, ax = case.solution(name, state), axes[row, column]
             colour = BAD if case.status(name, state) else GOOD
-            faces, _ = boundary(mesh)
             layer = Layer(mesh.points + solution.u, faces, colour, edges=True, line_width=1.5)
-            ax = axes[row, column]
             render([layer], view, 170 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
-            ax.text(
-                0.5,
-                0,
-                f"σ(r) = {solution.residual['std']:.2f}",
-                transform=ax.transAxes,
-                ha="center",
-                va="top",
-            )
-            if column == 0:
-                ax.text(
-                    -0.02,
-                    0.5,
-                    name,
-                    transform=ax.transAxes,
-                    rotation=90,
-                    ha="right",
-                    va="center",
-                    fontsize=9,
-                )
+            style.note(ax, f"σ(r) = {solution.residual['std']:.2f}")
+        style.row_name(axes[row, 0], name)
     style.save(fig, outputs)
 
 
@@ -75,7 +57,7 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
             render([layer], view, 150 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), d * columns + column)
             text = f"{style.signed(values.min())} to {style.signed(values.max())}"
-            ax.text(0.5, 0, text, transform=ax.transAxes, ha="center", va="top", fontsize=8)
+            style.note(ax, text, fontsize=8)
         label = f"$u_{style.AXES[d]}$ ({style.voxels(case.voxel_um())})"
         style.colour_bar(fig, axes[d], norm, cmap, label, shrink=0.85, aspect=18, pad=0.01)
     style.save(fig, outputs)

@@ -123,24 +123,36 @@ def render(
     points = np.vstack([layer.points for layer in layers]) if fit is None else fit
     flat = view.project(points)
     low, high = flat.min(axis=0), flat.max(axis=0)
-    size = (high - low) * (1 + 2 * margin)
-    middle = (low + high) / 2
+    middle, size = (low + high) / 2, (high - low) * (1 + 2 * margin)
     columns = round(width_mm * INCH * DPI)
     rows = max(8, round(columns * size[1] / size[0]))
-    plotter = plotter_class()(off_screen=True, window_size=(columns, rows))
+    image = _screenshot(layers, view, (columns, rows), middle, size[1] / 2, shadows)
+    half = np.array([size[1] * columns / rows, size[1]]) / 2
+    left, bottom, right, top = *(middle - half), *(middle + half)
+    return Picture(image, (left, right, bottom, top))
+
+
+def _screenshot(
+    layers: list[Layer],
+    view: View,
+    pixels: tuple[int, int],
+    middle: np.ndarray,
+    half_height: float,
+    shadows: bool,
+) -> np.ndarray:
+    """The image (rows, columns, 3) of a camera onto the middle (2,) of the picture."""
+    plotter = plotter_class()(off_screen=True, window_size=pixels)
     plotter.set_background("white")
     depth = np.concatenate([layer.points for layer in layers]) @ view.towards
     for layer in layers:
         _add(plotter, _faded(layer, view, depth.min(), depth.max()) if shadows else layer)
-    _aim(plotter, view, middle, size[1] / 2, depth)
+    _aim(plotter, view, middle, half_height, depth)
     if shadows:
-        plotter.enable_ssao(radius=float(size.max()) / 25, kernel_size=48)
+        plotter.enable_ssao(radius=max(pixels) / pixels[1] * half_height / 12, kernel_size=48)
     plotter.enable_anti_aliasing("ssaa")
     image = plotter.screenshot(return_img=True)
     plotter.close()
-    half = np.array([size[1] * columns / rows, size[1]]) / 2
-    left, bottom, right, top = *(middle - half), *(middle + half)
-    return Picture(image, (left, right, bottom, top))
+    return image
 
 
 def _faded(layer: Layer, view: View, far: float, near: float) -> Layer:
@@ -166,26 +178,27 @@ def _aim(plotter, view: View, middle: np.ndarray, half_height: float, depth: np.
     camera.clipping_range = (0.05 * distance, 2 * distance)
 
 
-def _add(plotter, layer: Layer) -> None:
-    """One layer with its colours; mapped values are lit softly so that they match the bar."""
+def _polydata(layer: Layer):
+    """The polygons or lines of a layer, as VTK has them."""
     import pyvista
 
-    if len(layer.faces) == 0:
-        return
     if layer.faces.shape[1] == 2:
         pairs = np.column_stack([np.full(len(layer.faces), 2), layer.faces]).ravel()
-        mesh = pyvista.PolyData(layer.points, lines=pairs)
-    else:
-        mesh = pyvista.PolyData.from_regular_faces(layer.points, layer.faces)
+        return pyvista.PolyData(layer.points, lines=pairs)
+    return pyvista.PolyData.from_regular_faces(layer.points, layer.faces)
+
+
+def _add(plotter, layer: Layer) -> None:
+    """One layer with its colours; mapped values are lit softly so that they match the bar."""
+    if len(layer.faces) == 0:
+        return
+    mesh = _polydata(layer)
     options = {
         "opacity": layer.opacity,
         "smooth_shading": layer.smooth,
-        "show_edges": layer.edges,
-        "edge_color": "#30343a",
         "line_width": layer.line_width,
-        "ambient": 0.3,
-        "diffuse": 0.85,
     }
+    options |= {"show_edges": layer.edges, "edge_color": "#30343a", "ambient": 0.3, "diffuse": 0.85}
     colours = layer.colour
     if layer.values is not None:
         colours = (255 * colormaps[layer.cmap](layer.norm(layer.values))[:, :3]).astype(np.uint8)

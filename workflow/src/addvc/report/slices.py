@@ -63,6 +63,8 @@ def _grid_over_slice(ax: Axes, volume: np.ndarray, specimen: Specimen, nodes: np
     ax.vlines(across, along[0], along[-1], color="#5aa9ff", lw=1.2)
     ax.hlines(along, across[0], across[-1], color="#5aa9ff", lw=1.2)
     for face, shift, side in ((specimen.low, -2, "top"), (specimen.high, 2, "bottom")):
+        if not 0 < face < plane.shape[1] - 1:
+            continue  # no platen in the image at this end
         ax.axhline(face, color=style.ORANGE, lw=1.2, ls="--")
         ax.text(
             0.02 * plane.shape[0],

@@ -142,32 +142,26 @@ def nice_length(reach: float) -> float:
     return float(power * max(m for m in (1, 2, 5) if m * power <= reach * (1 + 1e-9)))
 
 
-def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3, colour: str = "black") -> None:
+def note(ax: Axes, text: str, x: float = 0.5, y: float = 0.0, **options) -> None:
+    """Words below a panel, at a share of its width and height."""
+    options = {"ha": "center", "va": "top"} | options
+    ax.text(x, y, text, transform=ax.transAxes, **options)
+
+
+def row_name(ax: Axes, name: str) -> None:
+    """The name of a row, upright at the left of its first panel."""
+    note(ax, name, -0.03, 0.5, rotation=90, ha="right", va="center", fontsize=9)
+
+
+def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3) -> None:
     """A bar below the picture, about `share` of its width, with its length in both units."""
     left, right = sorted(ax.get_xlim())
     length = nice_length(share * (right - left))
     micro = length * voxel_um
     size = f"{micro / 1000:.3g} mm" if micro >= 1000 else f"{micro:.3g} µm"
-    end = length / (right - left)
-    ax.plot(
-        [0, end],
-        [-0.025, -0.025],
-        color=colour,
-        lw=2,
-        transform=ax.transAxes,
-        clip_on=False,
-        solid_capstyle="butt",
-    )
-    ax.text(
-        0,
-        -0.04,
-        f"{length:g} voxels = {size}",
-        transform=ax.transAxes,
-        va="top",
-        ha="left",
-        fontsize=8,
-        color=colour,
-    )
+    end, where = length / (right - left), {"transform": ax.transAxes, "clip_on": False}
+    ax.plot([0, end], [-0.025, -0.025], "k", lw=2, solid_capstyle="butt", **where)
+    note(ax, f"{length:g} voxels = {size}", 0, -0.04, ha="left", fontsize=8)
 
 
 def save(fig: Figure, outputs: Iterable[str | Path]) -> None:

@@ -55,6 +55,8 @@ def clipped(mesh: Mesh, low, high, **fields: np.ndarray) -> tuple[np.ndarray, np
 
     corner = mesh.points[mesh.cells]
     near = ((corner.max(axis=1) >= low) & (corner.min(axis=1) <= high)).all(axis=1)
+    if not near.any():
+        return np.empty((0, 3)), np.empty((0, 3), int), {k: v[:0] for k, v in fields.items()}
     points, cells, used = compact(mesh.points, mesh.cells[near])
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: cells}, points)
     for name, values in fields.items():

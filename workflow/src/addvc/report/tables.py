@@ -32,15 +32,7 @@ def acquisition(case: Case, outputs: Iterable[str], config: dict) -> None:
     first, count = scans["scans"][0], len(case.states)
     rows = [
         ["Parameter", "Value", "Unit"],
-        [
-            "Source",
-            "synthetic test"
-            if "twin" in config
-            else "reference scan, deformed by a known field"
-            if "virtual" in config
-            else "scans",
-            "–",
-        ],
+        ["Source", source(config), "–"],
         ["Number of scans", f"{count + 1} (1 reference + {count} loadings)", "–"],
         ["Definition", times(first["shape"]), "voxel"],
         ["Voxel size", f"{scans['voxel_size_um']:g}", "µm"],
@@ -58,6 +50,13 @@ def acquisition(case: Case, outputs: Iterable[str], config: dict) -> None:
     ]
     for path in outputs:
         write_table(path, rows)
+
+
+def source(config: dict) -> str:
+    """Where the images come from."""
+    if "twin" in config:
+        return "synthetic test"
+    return "reference scan, deformed by a known field" if "virtual" in config else "scans"
 
 
 def memory(scan: dict) -> float:

@@ -9,15 +9,8 @@ from addvc.fem.mesh import Mesh
 from addvc.geometry.region import Region, caps_depth
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, Picture, View, aspect, facing, render
-from addvc.report.surfaces import (
-    boundary,
-    box_corners,
-    clipped,
-    segmented,
-    slab,
-    slab_box,
-)
+from addvc.report.scene import Layer, View, aspect, facing, render
+from addvc.report.surfaces import boundary, clipped, segmented, slab, slab_box
 
 MESO, MICRO = "#e0903c", "#3d86cf"
 NEAR = 1.5  # voxels from the middle of a triangle: its plane stands for the surface
@@ -30,34 +23,35 @@ def warped(case: Case, outputs: Iterable[str]) -> None:
     before = slab_box(mesh, axis, case.cell_size)
     after = _carried_box(mesh, u[case.micro[0]], before, axis)
     image = segmented(case.image(state)[0], case.gamma, *after)
-    bodies = [
-        segmented(case.image(0)[0], case.gamma, *before),
-        image,
-        *(_cut(mesh, u[name], *after) for name in u),
-    ]
-    titles = [
-        "segmented $I_r$",
-        f"segmented $I_d$, {case.labels[state]}",
-        *(f"$I_r$ carried by {name}{_failure(case, name, state)}" for name in u),
-    ]
-    view = facing(axis, slab(mesh, axis, 1)[0])
-    fit = np.vstack([box_corners(*before), box_corners(*after)])
+    bodies = {
+        "segmented $I_r$": segmented(case.image(0)[0], case.gamma, *before),
+        f"segmented $I_d$, {case.labels[state]}": image,
+    }
+    for name in u:
+        title = f"$I_r$ carried by {name}{_failure(case, name, state)}"
+        bodies[title] = _cut(mesh, u[name], *after)
+    _draw_warped(bodies, image, facing(axis, slab(mesh, axis, 1)[0]), case.voxel_um(), outputs)
+
+
+def _draw_warped(bodies: dict, image, view: View, voxel_um: float, outputs) -> None:
+    """The four surfaces of Fig. 16 at one scale, the carried ones with their distance to I_d."""
+    fit = np.vstack([points for points, _ in bodies.values() if len(points)])
     fig, axes = style.panels(2, 2, aspect(view, fit), spare=16)
-    for panel, (ax, body) in enumerate(zip(axes.flat, bodies, strict=True)):
-        layer = Layer(*body, (style.SOLID, style.SOLID, MESO, MICRO)[panel])
-        render([layer], view, 82, fit, shadows=True).show(ax)
-        style.headline(ax, titles[panel], panel)
+    colours = style.SOLID, style.SOLID, MESO, MICRO
+    for panel, (ax, (title, body)) in enumerate(zip(axes.flat, bodies.items(), strict=True)):
+        render([Layer(*body, colours[panel])], view, 82, fit, shadows=True).show(ax)
+        style.headline(ax, title, panel)
         if panel > 1:
             _write_gap(ax, _gap(body[0], image))
-    style.scale_bar(axes[0, 0], case.voxel_um(), 0.2)
+    style.scale_bar(axes[0, 0], voxel_um, 0.2)
     style.save(fig, outputs)
 
 
 def _write_gap(ax, gap: np.ndarray) -> None:
     """Below a panel, how far the carried surface is from the segmented image."""
-    middle, far = np.median(gap), np.percentile(gap, 95)
+    middle, far = np.percentile(gap, (50, 95)) if len(gap) else (np.nan, np.nan)
     text = f"distance to $I_d$: median {middle:.2f}, p95 {far:.2f} voxels"
-    ax.text(0.5, -0.02, text, transform=ax.transAxes, ha="center", va="top")
+    style.note(ax, text, y=-0.02)
 
 
 def _failure(case: Case, name: str, state: int) -> str:
@@ -103,48 +97,30 @@ def _gap(points: np.ndarray, image: tuple[np.ndarray, np.ndarray]) -> np.ndarray
 def zoom(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 17: two places where meso and micro differ most: I_r, then either carried onto I_d."""
     mesh, state = case.mesh("micro"), case.shown_state()
-    u = {name: case.displacement(name, state) for name in (case.finest, case.micro[0])}
+    meso, micro = (case.displacement(name, state) for name in (case.finest, case.micro[0]))
     half = 0.45 * case.cell_size
-    places = _places(case, mesh, np.linalg.norm(u[case.micro[0]] - u[case.finest], axis=1), half)
+    places = _places(case, mesh, np.linalg.norm(micro - meso, axis=1), half)
     deformed, gamma = case.image(state)[0], case.gamma
+    titles = [r"$\Omega_r$", *(_zoom_title(case, n, state) for n in (case.finest, case.micro[0]))]
     fig, axes = style.panels(len(places), 3, 1.0)
     for row, node in enumerate(places):
-        view = _across(u[case.micro[0]][node] - u[case.finest][node], case.specimen.axis)
-        for column, name in enumerate((None, *u)):
-            ax, panel = axes[row, column], 3 * row + column
-            _zoom(mesh, u, name, node, half, deformed, gamma, view).show(ax)
-            style.headline(ax, _zoom_title(case, name, state), panel)
+        view = _across(micro[node] - meso[node], case.specimen.axis)
+        here, there = mesh.points[node], mesh.points[node] + micro[node]
+        box = there - half, there + half
+        image = Layer(*segmented(deformed, gamma, *box), style.SOLID, opacity=0.6, smooth=True)
+        carried = [[image, Layer(*_cut(mesh, u, *box), style.RED)] for u in (meso, micro)]
+        still = [Layer(*_cut(mesh, np.zeros_like(micro), here - half, here + half))]
+        for column, layers in enumerate((still, *carried)):
+            centre = there if column else here
+            fit = centre + half * np.vstack([view.right + view.up, -view.right - view.up])
+            render(layers, view, 55, fit).show(axes[row, column])
+            style.headline(axes[row, column], titles[column], 3 * row + column)
         style.scale_bar(axes[row, 0], case.voxel_um())
     style.save(fig, outputs)
 
 
-def _zoom_title(case: Case, name: str | None, state: int) -> str:
-    if name is None:
-        return r"$\Omega_r$"
+def _zoom_title(case: Case, name: str, state: int) -> str:
     return rf"$\Omega_d$ and $\Omega_r + u$, {name}{_failure(case, name, state)}"
-
-
-def _zoom(
-    mesh: Mesh,
-    u: dict,
-    name: str | None,
-    node: int,
-    half: float,
-    deformed,
-    gamma: float,
-    view: View,
-) -> Picture:
-    """One panel: the reference, or in grey I_d with the carried reference in red."""
-    centre = mesh.points[node] + (0 if name is None else list(u.values())[-1][node])
-    box = centre - half, centre + half
-    fit = centre + half * np.vstack([view.right + view.up, -view.right - view.up])
-    if name is None:
-        return render([Layer(*_cut(mesh, np.zeros_like(mesh.points), *box))], view, 55, fit)
-    layers = [
-        Layer(*segmented(deformed, gamma, *box), style.SOLID, opacity=0.6, smooth=True),
-        Layer(*_cut(mesh, u[name], *box), style.RED),
-    ]
-    return render(layers, view, 55, fit)
 
 
 def _places(case: Case, mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:

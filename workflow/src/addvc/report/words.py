@@ -19,12 +19,17 @@ def closing_lines(summary: dict, folder: str) -> str:
         found = state[micro]
         lines.append(
             f"  state {state['state']} ({state['strain']:.1%} measured): "
-            f"{VERDICTS[state['verdict']]}; sigma(r) {found['residual_std']:.2f}, "
+            f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}, "
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
             + error_words(found["error"])
         )
     lines.append(f"  open the report: xdg-open {folder}/report.html")
     return "\n".join(lines)
+
+
+def figure(value: float | None, form: str) -> str:
+    """A number in a format, or "unknown": a state that left the image has no residual."""
+    return "unknown" if value is None else format(value, form)
 
 
 def error_words(error: dict | None) -> str:
@@ -98,7 +103,7 @@ def warnings(summary: dict) -> list[str]:
             if not one["converged"]:
                 found.append(
                     f"- State {state['state']}, {mesh}: the loop did not end in "
-                    f"{one['iterations']} iterations (last rms(du) {one['last_step']:.1e} "
+                    f"{one['iterations']} iterations (last rms(du) {figure(one['last_step'], '.1e')} "
                     "voxel). Look at the residual maps (Fig. 13); a longer "
                     "regularisation length or a better start may help."
                 )
@@ -126,7 +131,7 @@ def results_table(summary: dict) -> list[str]:
     for state in summary["states"]:
         for mesh in summary["meshes"]:
             error = state[mesh]["error"] or {}
-            row = [state["label"], mesh, f"{state[mesh]['residual_std']:.3f}"]
+            row = [state["label"], mesh, figure(state[mesh]["residual_std"], ".3f")]
             rows.append(row + [f"{error[key]:.3f}" for key in ("median", "p95", "rms") if error])
     return list_table(header, rows)
 
@@ -139,7 +144,7 @@ def convergence_table(summary: dict) -> list[str]:
             state["start"],
             mesh,
             str(state[mesh]["iterations"]),
-            f"{state[mesh]['last_step']:.1e}",
+            figure(state[mesh]["last_step"], ".1e"),
             "yes" if state[mesh]["converged"] else "NO",
         ]
         for state in summary["states"]

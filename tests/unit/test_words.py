@@ -1,0 +1,213 @@
+"""The words that go with the numbers: closing lines, front page, warnings, strictness."""
+
+import copy
+
+import docutils.core
+import docutils.nodes
+import pytest
+
+from addvc.errors import AddvcError
+from addvc.report.words import check_verdicts, closing_lines, front_page, micro_name, warnings
+
+CONFIG = {"case": "foam-2_b", "scans": {"reference": "scans/*.tif"}, "micro": {"methods": ["eq10"]}}
+SCANS = {
+    "scans": [
+        {"path": path, "shape": [72, 84, 72], "dtype": "uint8", "fingerprint": "ab" * 32}
+        for path in ("scans/reference.tif", "/data/state_1/slice*.tif", "scans/*.tif", "2/_a_/|x|")
+    ]
+}
+MESH = {
+    "nodes": 283, "cells": 1112, "mean_edge": 12.06, "mean_volume": 147.5, "min_dihedral": 10.2,
+    "ultimate_error": 2.1e-3, "kept_fraction": 0.99, "voxel_kept_fraction": 0.98,
+}  # fmt: skip
+ERROR = {"median": 0.0325, "p95": 0.0838, "rms": 0.045}
+
+
+def found(converged=True, valid=1.0, error=ERROR):
+    """What is said of one mesh in one state."""
+    return {
+        "converged": converged,
+        "iterations": 4 if converged else 40,
+        "last_step": 4.2e-4 if converged else 0.31,
+        "residual_std": 0.56,
+        "residual_mean": -0.5,
+        "valid_nodes": valid,
+        "seconds": 0.3,
+        "error": error,
+    }
+
+
+def state(number, verdict, **micro):
+    """One state: the meso mesh is always in order."""
+    return {
+        "state": number,
+        "label": f"{number}.4 %",
+        "strain": 0.011 * number,
+        "start": "zero",
+        "candidates": [],
+        "verdict": verdict,
+        "meso12": found(error=micro.get("error", ERROR)),
+        "micro": found(**micro),
+        "struts": None,
+    }
+
+
+def summary(*states):
+    return {
+        "case": "foam-2_b",
+        "cell_size": 27.98,
+        "threshold": 49.06,
+        "porosity": 0.96,
+        "noise": 1.0,
+        "voxel_size_um": 20.01,
+        "meshes": {"meso12": MESH, "micro": MESH},
+        "states": list(states),
+        "cost": {"volume": {"jobs": 2, "cpu_s": 1.0, "wall_s": 2.0, "max_rss_mb": 99.0},
+                 "micro_dvc": {"jobs": 1, "cpu_s": 9.0, "wall_s": 9.0, "max_rss_mb": 300.0}},
+        "versions": {"addvc": "0.1.0", "numpy": "2.1"},
+    }  # fmt: skip
+
+
+GOOD = state(1, "converged")
+DOUBTFUL = state(2, "flagged", valid=0.8)
+ENDLESS = state(3, "flagged", converged=False)
+LOST = state(4, "failed", converged=False, valid=0.2)
+UNKNOWN = state(5, "failed", converged=False, valid=0.0)  # left the image: no number in the file
+UNKNOWN["micro"] |= {"residual_std": None, "residual_mean": None, "last_step": None}
+REAL = state(6, "converged", error=None)
+ALL = (GOOD, DOUBTFUL, ENDLESS, LOST, UNKNOWN)
+
+
+def sections(text):
+    """Title -> text of the sections of a page, by docutils."""
+    tree = docutils.core.publish_doctree(text, settings_overrides={"report_level": 5})
+    return {part[0].astext(): part.astext() for part in tree.findall(docutils.nodes.section)}
+
+
+# --------------------------------------------------------------------------- closing lines
+
+
+@pytest.mark.parametrize(
+    ("one", "words"),
+    [
+        (GOOD, "state 1 (1.1% measured): converged; sigma(r) 0.56, 4 iterations, 100.0% of nodes "
+               "valid, error median 0.033, p95 0.084 voxel"),
+        (DOUBTFUL, "state 2 (2.2% measured): measured, with doubtful places; "),
+        (ENDLESS, "state 3 (3.3% measured): measured, with doubtful places; sigma(r) 0.56, 40 iter"),
+        (LOST, "state 4 (4.4% measured): FAILED: not to be used; sigma(r) 0.56, 40 iterations, "
+               "20.0% of nodes valid"),
+        (UNKNOWN, "state 5 (5.5% measured): FAILED: not to be used; sigma(r) unknown, 40 iter"),
+    ],
+)  # fmt: skip
+def test_closing_lines_tell_the_verdict_of_each_state(one, words):
+    lines = closing_lines(summary(GOOD, one), "results/foam").splitlines()
+    assert lines[0] == "addvc: case foam-2_b is done; results are in results/foam/"
+    assert len(lines) == 4
+    assert words in lines[2]
+    assert lines[3].endswith("results/foam/report.html")
+
+
+def test_without_a_truth_no_error_is_told():
+    assert "error" not in closing_lines(summary(REAL), "results/foam")
+
+
+def test_the_first_micro_method_speaks():
+    both = summary(GOOD)
+    both["meshes"] = {"meso12": MESH, "micro": MESH, "micro-eq10": MESH}
+    both["states"][0] = GOOD | {"micro-eq10": found(valid=0.123)}
+    assert micro_name(both) == "micro"
+    assert "12.3%" not in closing_lines(both, "results/foam")
+
+
+# ------------------------------------------------------------------------------ front page
+
+
+@pytest.mark.parametrize("states", [ALL, (GOOD,), (REAL,), ()], ids=["all", "good", "real", "none"])
+def test_the_front_page_is_valid(states):
+    text = front_page(summary(*states), CONFIG, SCANS)
+    tree = docutils.core.publish_doctree(text, settings_overrides={"report_level": 5})
+    loud = [node for node in tree.findall(docutils.nodes.system_message) if node["level"] >= 2]
+    assert [node.astext() for node in loud] == []
+
+
+def test_the_front_page_has_its_parts_in_order():
+    parts = list(sections(front_page(summary(*ALL), CONFIG, SCANS)))
+    assert parts == ["Warnings and failures", "Residual and error of each mesh", "Convergence",
+                     "Meshes", "Cost", "Scans", "Configuration", "Versions"]  # fmt: skip
+
+
+def test_the_front_page_answers_first():
+    head = front_page(summary(*ALL), CONFIG, SCANS).split("Warnings and failures")[0]
+    assert "5 loading states" in head
+    assert "28.0 voxels (560 micrometres)" in head
+    assert "State 1 (1.4 %; 1.1% measured): **converged**" in head
+    assert "State 2 (2.4 %; 2.2% measured): **measured, with doubtful places**, 80.0% of" in head
+    assert "State 4 (4.4 %; 4.4% measured): **FAILED: not to be used**, 20.0% of" in head
+
+
+def test_the_tables_of_the_front_page_hold_the_numbers():
+    parts = sections(front_page(summary(*ALL), CONFIG, SCANS))
+    assert "0.033" in parts["Residual and error of each mesh"]
+    assert "3.1e-01\n\nNO" in parts["Convergence"]
+    assert "2.10e-03" in parts["Meshes"]
+    assert parts["Cost"].index("micro_dvc") < parts["Cost"].index("volume")
+    assert "methods:" in parts["Configuration"]
+    for row in SCANS["scans"]:
+        assert row["path"] in parts["Scans"]
+
+
+def test_without_a_truth_there_are_no_columns_of_errors():
+    parts = sections(front_page(summary(REAL), CONFIG, SCANS))
+    assert "error" not in parts["Residual and error of each mesh"].split("\n", 2)[2]
+
+
+# -------------------------------------------------------------------------------- warnings
+
+
+def test_nothing_to_warn_of_is_said_so():
+    assert warnings(summary(GOOD, REAL)) == ["None."]
+    parts = sections(front_page(summary(GOOD, REAL), CONFIG, SCANS))
+    assert parts["Warnings and failures"].endswith("None.")
+
+
+@pytest.mark.parametrize(
+    ("one", "words"),
+    [
+        (DOUBTFUL, ["State 2", "20"]),
+        (ENDLESS, ["State 3, micro", "40 iterations", "3.1e-01"]),
+        (LOST, ["State 4 could not be registered"]),
+    ],
+    ids=["doubtful", "endless", "lost"],
+)
+def test_a_state_that_is_not_converged_has_a_warning(one, words):
+    found = "\n".join(warnings(summary(GOOD, one)))
+    assert "None." not in found and "State 1" not in found
+    for word in words:
+        assert word in found
+
+
+def test_a_meso_loop_that_did_not_end_has_a_warning():
+    one = copy.deepcopy(GOOD)
+    one["meso12"] = found(converged=False)
+    assert "State 1, meso12: the loop did not end in 40 iterations" in warnings(summary(one))[0]
+
+
+@pytest.mark.parametrize(("kept", "warned"), [(0.91, False), (0.85, True)])
+def test_solid_that_was_left_out_has_a_warning(kept, warned):
+    case = summary(GOOD)
+    case["meshes"]["micro"] = MESH | {"kept_fraction": kept, "voxel_kept_fraction": 1.0}
+    text = "\n".join(warnings(case))
+    assert ("15% of the segmented solid" in text and "lower mesh.size" in text) == warned
+
+
+# ------------------------------------------------------------------------------ strictness
+
+
+def test_strict_makes_a_failed_state_an_error():
+    with pytest.raises(AddvcError, match=r"1 of 3 states failed \(4\.4 %; at most 0\).*strict: f"):
+        check_verdicts(summary(GOOD, DOUBTFUL, LOST), strict=True)
+
+
+def test_only_strict_and_only_a_failed_state():
+    check_verdicts(summary(GOOD, LOST), strict=False)
+    check_verdicts(summary(GOOD, DOUBTFUL, ENDLESS), strict=True)

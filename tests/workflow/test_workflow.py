@@ -1,0 +1,383 @@
+"""The whole workflow on a tiny twin, in a copy of the repository: results, reruns, kills, bad input."""
+
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import yaml
+
+pytestmark = pytest.mark.workflow
+
+ROOT = Path(__file__).parents[2]
+PARTS = ("Snakefile", "config", "envs", "profiles", "workflow")
+CONFIG = "config/test.yaml"
+MESO = ["meso24", "meso16", "meso12"]
+MESHES = [*MESO, "micro"]
+STATES = (1, 2)
+LARGEST = {"median": 0.10, "p95": 0.25}  # error of micro DVC at bulk nodes, voxels
+
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "SNAKEMAKE_PROFILE"}
+ENVIRONMENT |= {"OPENBLAS_NUM_THREADS": "1"}
+
+
+def command(*arguments, config=CONFIG):
+    return [sys.executable, "-m", "snakemake", *arguments, "--cores", "2", "--configfile", config]
+
+
+def snakemake(place, *arguments, config=CONFIG):
+    """A call of snakemake in a folder: its status, and all that it said in `stdout`."""
+    return subprocess.run(
+        command(*arguments, config=config),
+        cwd=place,
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=1500,
+    )
+
+
+def planned(place):
+    """Rules that a dry run would run."""
+    said = snakemake(place, "--dry-run").stdout
+    if "Nothing to be done" in said:
+        return set()
+    table = re.search(r"^Job stats:\n.*\n-.*\n((?:\w+ +\d+\n)+)", said, re.M)
+    return {line.split()[0] for line in table[1].splitlines()} - {"total", "all"}
+
+
+def started(said):
+    """Rules of which a job was started."""
+    return set(re.findall(r"^(?:local)?rule (\w+):$", said, re.M))
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A copy of the repository, without results; with what numba has compiled, which is slow."""
+    folder = tmp_path_factory.mktemp("repository")
+    for part in PARTS:
+        if (ROOT / part).is_dir():
+            shutil.copytree(ROOT / part, folder / part)
+        else:
+            shutil.copy2(ROOT / part, folder / part)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(place):
+    """The first run, up to the report."""
+    start = time.perf_counter()
+    done = snakemake(place)
+    print(f"the workflow took {time.perf_counter() - start:.0f} s")
+    assert done.returncode == 0, done.stdout[-8000:]
+    return done
+
+
+@pytest.fixture(scope="module")
+def results(place, run):
+    return place / "results/test"
+
+
+@pytest.fixture(scope="module")
+def summary(results):
+    return json.loads((results / "summary.json").read_text())
+
+
+# --------------------------------------------------------------------------- what is there
+
+
+def test_the_run_closes_with_the_verdict_of_each_state(run):
+    for state in STATES:
+        assert re.search(rf"^  state {state} \(.*measured\): converged; sigma", run.stdout, re.M)
+    assert "open the report: xdg-open results/test/report.html" in run.stdout
+
+
+def test_the_report_holds_everything_and_fetches_nothing(results):
+    text = (results / "report.html").read_text()
+    away = r"""["']?(?:https?:)?//"""
+    tags = r"<(?:script|img|link|iframe|source|embed|object|video)\b"
+    assert re.findall(rf"{tags}[^>]*?\b(?:src|href|data)\s*=\s*{away}[^>]*>", text) == []
+    assert re.findall(rf"url\(\s*{away}|@import\s+{away}", text) == []
+    assert "Warnings and failures" in text
+    for name in figures():
+        assert name in text
+
+
+def figures():
+    """Names of all figures and tables in the rules."""
+    rules = (ROOT / "workflow/rules/figures.smk").read_text()
+    shown = re.findall(r'shown\(\s*"(.+?)"', rules)
+    return shown + [f"{name}.svg" for name in re.findall(r'drawing\("(.+?)"\)', rules)]
+
+
+def test_every_figure_of_the_rules_is_there(results):
+    names = figures()
+    assert len(names) > 15
+    for name in names:
+        assert (results / "figures" / name).stat().st_size > 300, name
+
+
+def test_nothing_half_written_is_left(results):
+    assert [path for path in results.rglob(".*") if path.is_file()] == []
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("mesh", MESHES)
+def test_fields_open_in_other_programs(results, summary, mesh, state):
+    field = meshio.read(results / f"fields/{mesh}_state{state}.vtu")
+    nodes = len(field.points)
+    figures = summary["meshes"]["micro" if mesh == "micro" else mesh]
+    assert (nodes, len(field.cells[0].data)) == (figures["nodes"], figures["cells"])
+    assert field.point_data["displacement"].shape == (nodes, 3)
+    assert np.isfinite(field.point_data["displacement"]).all()
+    assert set(np.unique(field.point_data["valid"])) <= {0, 1}
+    valid = summary["states"][state - 1][mesh]["valid_nodes"]
+    assert field.point_data["valid"].mean() == pytest.approx(valid)
+    strain = field.cell_data["strain"][0].reshape(-1, 3, 3)
+    assert np.isfinite(strain).all()
+    np.testing.assert_array_equal(strain, strain.transpose(0, 2, 1))
+
+
+def test_the_summary_has_the_names_that_others_rely_on(summary):
+    assert set(summary) >= {"case", "cell_size", "threshold", "porosity", "voxel_size_um",
+                            "meshes", "states", "cost", "versions"}  # fmt: skip
+    assert list(summary["meshes"]) == MESHES
+    for mesh in MESHES:
+        assert set(summary["meshes"][mesh]) >= {"nodes", "cells", "mean_volume", "ultimate_error"}
+    assert [state["state"] for state in summary["states"]] == list(STATES)
+    for state in summary["states"]:
+        assert set(state) >= {"state", "strain", "verdict", "struts", *MESHES}
+        for mesh in MESHES:
+            assert set(state[mesh]) >= {"converged", "iterations", "residual_std", "error"}
+            assert set(state[mesh]["error"]) >= {"rms", "median", "p95", "rms_normal", "rms_along"}
+    for rule in ("volume", "micro_mesh", "micro_dvc"):
+        assert set(summary["cost"][rule]) >= {"cpu_s", "wall_s", "max_rss_mb"}
+    assert {"addvc", "python", "snakemake", "numpy"} <= set(summary["versions"])
+
+
+# -------------------------------------------------------------------------------- how good
+
+
+def test_the_twin_is_measured_as_it_was_made(summary):
+    assert summary["case"] == "test"
+    assert summary["cell_size"] == pytest.approx(28, rel=0.1)
+    assert summary["porosity"] == pytest.approx(0.96, abs=0.002)
+    assert summary["voxel_size_um"] == pytest.approx(20.01)
+    for state, nominal in zip(summary["states"], (0.034, 0.052), strict=True):
+        assert state["strain"] == pytest.approx(nominal, rel=0.2)
+
+
+def test_every_finer_mesh_has_a_smaller_residual(summary):
+    for state in summary["states"]:
+        sigma = [state[mesh]["residual_std"] for mesh in MESHES]
+        assert sigma == sorted(sigma, reverse=True) and len(set(sigma)) == len(sigma)
+
+
+def test_micro_dvc_converges(summary):
+    for state in summary["states"]:
+        assert state["micro"]["converged"] and state["verdict"] == "converged"
+        assert state["micro"]["valid_nodes"] >= 0.95
+
+
+@pytest.mark.parametrize("figure", LARGEST)
+def test_error_of_micro_dvc(summary, figure):
+    """Below what was asked for, and below that of every meso mesh."""
+    for state in summary["states"]:
+        micro, *meso = (state[mesh]["error"][figure] for mesh in ("micro", *MESO))
+        assert micro <= LARGEST[figure]
+        assert micro < min(meso)
+
+
+# ---------------------------------------------------------------------------------- reruns
+
+
+def test_a_second_run_does_nothing(place, results):
+    again = snakemake(place)
+    assert again.returncode == 0
+    assert "Nothing to be done" in again.stdout
+
+
+def test_a_touch_makes_nothing_again(place, results):
+    for name in ("src/addvc/correlation/gauss_newton.py", "scripts/micro/micro_dvc.py"):
+        os.utime(place / "workflow" / name)
+    assert planned(place) == set()
+
+
+@pytest.fixture
+def edited(place):
+    """edited(module): a comment more in a module of the copy, for one test."""
+    kept = {}
+
+    def edit(name):
+        path = place / "workflow/src/addvc" / name
+        kept[path] = path.read_text(), path.stat()
+        path.write_text(kept[path][0] + "# changed\n")
+
+    yield edit
+    for path, (text, was) in kept.items():
+        path.write_text(text)
+        os.utime(path, ns=(was.st_atime_ns, was.st_mtime_ns))
+
+
+def test_an_edit_makes_again_what_uses_the_module_and_what_follows(place, summary, edited):
+    edited("analysis/summary.py")
+    plan = planned(place)
+    assert plan >= {"summary", "front_page", "report", "verdicts"}
+    assert plan.isdisjoint(summary["cost"]), "nothing that was made before the summary"
+
+
+def test_an_edit_makes_nothing_again_that_comes_before(place, results, edited):
+    edited("geometry/threshold.py")
+    plan = planned(place)
+    assert plan >= {"threshold", "micro_mesh", "factor", "micro_dvc", "residual", "summary"}
+    before = {"twin_scan", "check_input", "volume", "smooth", "specimen", "cell_size", "meso_mesh"}
+    assert plan.isdisjoint(before | {"start", "best_start", "meso_dvc"})
+
+
+# ------------------------------------------------------------------------------- bad input
+
+
+def bad_case(place, name, **changes):
+    """Writes a configuration of small scans with some changes, and gives its path."""
+    scans = {"reference": "scans/good.npy", "states": ["scans/good.npy"], "voxel_size_um": 20.01}
+    scans |= changes.pop("scans", {})
+    path = place / f"config/{name}.yaml"
+    path.write_text(yaml.safe_dump({"case": name, "scans": scans, "porosity": 0.96} | changes))
+    (place / "scans").mkdir(exist_ok=True)
+    return str(path.relative_to(place))
+
+
+def save(place, name, volume):
+    (place / "scans").mkdir(exist_ok=True)
+    np.save(place / "scans" / name, volume)
+
+
+def refused(done, *words):
+    """Status 1, all the words, no traceback, and no job of the correlation."""
+    assert done.returncode == 1
+    said = " ".join(done.stdout.split())
+    for word in words:
+        assert word in said, done.stdout[-4000:]
+    assert "Traceback" not in said
+    assert started(done.stdout).isdisjoint({"meso_dvc", "factor", "micro_dvc"})
+
+
+def test_a_misspelt_key(place):
+    done = snakemake(place, config=bad_case(place, "misspelt", porosty=0.9))
+    refused(done, "Configuration of case misspelt", "unknown key `porosty`",
+            "did you mean `porosity`?")  # fmt: skip
+    assert started(done.stdout) == set()
+
+
+def test_a_missing_scan(place):
+    config = bad_case(place, "missing", scans={"states": ["scans/nowhere.tif"]})
+    save(place, "good.npy", np.zeros((24, 24, 24), np.uint8))
+    done = snakemake(place, config=config)
+    refused(done, "scan scans/nowhere.tif was not found (0 files; at least 1)",
+            "correct scans.reference or scans.states")  # fmt: skip
+    assert started(done.stdout) == set()
+
+
+def test_a_raw_scan_of_the_wrong_size(place):
+    scans = {"reference": "scans/a.raw", "states": [], "shape": [40, 42, 44], "dtype": "uint16"}
+    config = bad_case(place, "raw", scans=scans)
+    (place / "scans/a.raw").write_bytes(bytes(40 * 42 * 44))
+    done = snakemake(place, config=config)
+    refused(done, "scans/a.raw: expected 147840 bytes", "found 73920", "correct scans.shape",
+            "the size would fit dtype uint8", "a stage of case raw could not be made")  # fmt: skip
+    assert started(done.stdout) == {"check_input"}
+
+
+def test_scans_that_are_no_images(place):
+    """Both are told of in one run: a stage that fails does not keep others from being made."""
+    holes = np.random.default_rng(2417).random((24, 26, 28), dtype=np.float32)
+    holes[5, 6, 7] = np.nan
+    save(place, "holes.npy", holes)
+    save(place, "flat.npy", np.full((24, 26, 28), 7, np.float32))
+    scans = {"reference": "scans/holes.npy", "states": ["scans/flat.npy"], "axes": "xyz"}
+    done = snakemake(place, config=bad_case(place, "noimage", scans=scans))
+    refused(done, "scans/holes.npy: 1 voxels are NaN or infinite", "(x, y, z) = (5, 6, 7)",
+            "crop them away or replace them", "scans/flat.npy: every voxel is 7.0",
+            "an image with structure is needed")  # fmt: skip
+
+
+def test_a_porosity_that_no_threshold_gives(place, results):
+    """The reference of the twin, with three quarters of its volume said to be solid."""
+    scan = "results/test/scans/state0.tif"
+    scans = {"reference": scan, "states": [scan], "bin": 2, "axes": "zyx"}
+    config = bad_case(place, "solid", scans=scans, porosity=0.25)
+    done = snakemake(place, "results/solid/dvc/micro_factor.h5", config=config)
+    refused(done, "[threshold] ERROR: the threshold", "within 2 standard deviations of the void",
+            "raise porosity, or give geometry.threshold")  # fmt: skip
+    assert not (place / "results/solid/geometry/micro.vtu").exists()
+
+
+# ----------------------------------------------------------------------------------- kills
+
+
+def begun(log, process):
+    """Waits until a job is at work; fails when the run ends before."""
+    for _ in range(600):
+        if re.search(r"^rule (meso_dvc|micro_dvc):$", log.read_text(), re.M):
+            return
+        assert process.poll() is None, log.read_text()[-4000:]
+        time.sleep(0.1)
+    pytest.fail(f"no job began in a minute: {log.read_text()[-4000:]}")
+
+
+def numbers(value, path=""):
+    """Every number and word that was measured, by its path; costs and times are not."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if key not in ("cost", "seconds", "versions"):
+                yield from numbers(item, f"{path}/{key}")
+    elif isinstance(value, list):
+        for place_, item in enumerate(value):
+            yield from numbers(item, f"{path}/{place_}")
+    else:
+        yield path, value
+
+
+def test_a_killed_run_goes_on_to_the_same_result(place, results, summary, tmp_path):
+    goal = "results/test/summary.json"
+    for name in ("dvc/micro_state1.h5", "dvc/meso12_state2.h5", "summary.json"):
+        (results / name).unlink()
+    log = tmp_path / "killed.txt"
+    with log.open("w") as file:
+        killed = subprocess.Popen(
+            command(goal), cwd=place, env=ENVIRONMENT, stdout=file, stderr=file,
+            start_new_session=True,
+        )  # fmt: skip
+    try:
+        begun(log, killed)
+        time.sleep(1.0)
+    finally:
+        os.killpg(killed.pid, signal.SIGKILL)
+    assert killed.wait() == -signal.SIGKILL
+    assert list((place / ".snakemake/locks").glob("*.lock"))
+    assert not (results / "summary.json").exists()
+
+    assert snakemake(place, "--unlock").returncode == 0
+    done = snakemake(place, goal, "--rerun-incomplete")
+    assert done.returncode == 0, done.stdout[-8000:]
+    assert started(done.stdout) >= {"meso_dvc", "micro_dvc", "residual", "summary"}
+    assert started(done.stdout).isdisjoint({"volume", "threshold", "micro_mesh", "best_start"})
+
+    before = dict(numbers(summary))
+    after = dict(numbers(json.loads((results / "summary.json").read_text())))
+    assert set(after) == set(before)
+    for path, value in before.items():
+        if isinstance(value, float):
+            assert math.isclose(after[path], value, rel_tol=1e-9), path
+        else:
+            assert after[path] == value, path
