@@ -187,7 +187,7 @@ def test_error_against_the_truth_of_a_virtual_test(tmp_path, rng):
     field = VirtualField((0.02, 0.05), axis=2)
     field.save(tmp_path / "virtual.json")
     points = 60 * rng.random((50, 3))
-    u = field.displacement(points, 2) + [0, 0.3, 0.4]
+    u = field.displacement(points, 2) + np.array([0, 0.3, 0.4])
     found = error_at(load_truth(tmp_path / "virtual.json"), points, u, 2)
     assert found["rms"] == pytest.approx(0.5) and found["p95"] == pytest.approx(0.5)
     assert found["rms_normal"] is None

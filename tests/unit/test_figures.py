@@ -194,7 +194,7 @@ def test_figures_of_a_case_with_a_failed_state_are_drawn(case, tmp_path):
     for name in names:
         image = plt.imread(name)
         page = np.array([style.HEIGHT, style.WIDTH]) * style.INCH * style.DPI
-        assert (image.shape[:2] <= page + 2).all()
+        assert (image.shape[:2] <= 1.03 * page).all()
         assert 0.001 < (image[..., :3].min(axis=-1) < 0.9).mean() < 0.9
 
 

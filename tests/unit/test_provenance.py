@@ -105,7 +105,8 @@ from pathlib import Path
 for path in sys.argv[1:]:
     for name in [name for name in sys.modules if name.split(".")[0] == "addvc"]:
         del sys.modules[name]
-    imports = [n for n in ast.parse(Path(path).read_text()).body if isinstance(n, ast.Import | ast.ImportFrom)]
+    body = ast.parse(Path(path).read_text()).body
+    imports = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
     exec(compile(ast.Module(imports, []), path, "exec"))
     files = [m.__file__ for name, m in sys.modules.items() if name.split(".")[0] == "addvc"]
     print(path, *files)

@@ -10,7 +10,7 @@ from addvc.images.platens import find_platens
 from addvc.images.spline import gaussian_blur
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, View, aspect, oblique, render
+from addvc.report.scene import Layer, Picture, View, aspect, oblique, render
 from addvc.report.surfaces import (
     boundary,
     box_corners,
@@ -51,20 +51,15 @@ def _foam(case: Case, state: int) -> tuple[np.ndarray, np.ndarray]:
 
 def meso_meshes(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 5: the meso meshes, a quarter of the cells taken away, with size and counts."""
-    fig = style.figure(76)
-    axes = fig.subplots(1, len(case.meso), squeeze=False)[0]
     axis = case.specimen.axis
-    view = oblique(axis)
-    fit = case.mesh(case.meso[0]).points
-    for panel, (ax, name) in enumerate(zip(axes, case.meso, strict=True)):
+    view, fit = oblique(axis), case.mesh(case.meso[0]).points
+    fig, axes = style.panels(1, len(case.meso), aspect(view, fit), spare=20)
+    for panel, (ax, name) in enumerate(zip(axes[0], case.meso, strict=True)):
         mesh, facts = case.mesh(name), case.mesh_facts(name)
-        render([_opened(mesh, view, axis)], view, 170 / len(axes), fit).show(ax)
+        render([_opened(mesh, view, axis)], view, 56, fit).show(ax)
         style.headline(ax, name, panel)
-        text = (
-            f"mean edge {facts['mean_edge']:.1f} voxels\n{facts['nodes']:,} nodes\n"
-            f"{facts['cells']:,} tetrahedra"
-        )
-        style.note(ax, text, y=-0.03)
+        counts = f"{facts['nodes']:,} nodes\n{facts['cells']:,} tetrahedra"
+        style.note(ax, f"mean edge {facts['mean_edge']:.1f} voxels\n{counts}", y=-0.03)
     style.save(fig, outputs)
 
 
@@ -88,16 +83,15 @@ def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
         f"σ = {sigma:g} voxels (used)": sigma,
         f"σ = {max(2.0, 2 * sigma):g} voxels (exaggerated)": max(2.0, 2 * sigma),
     }
-    fig = style.figure(70)
-    axes = fig.subplots(1, 3)
-    cube = box_corners(np.zeros(3), np.array(crop.shape) - 1.0)
-    for panel, (ax, (title, width)) in enumerate(zip(axes, widths.items(), strict=True)):
+    cube, view = box_corners(np.zeros(3), np.array(crop.shape) - 1.0), oblique(case.specimen.axis)
+    fig, axes = style.panels(1, 3, aspect(view, cube), spare=15)
+    for panel, (ax, (title, width)) in enumerate(zip(axes[0], widths.items(), strict=True)):
         grey = gaussian_blur(crop, width)
         gamma = float(np.quantile(grey, 1 - share)) if width > sigma else case.gamma
         body = segmented(grey, gamma, np.zeros(3), np.array(crop.shape))
-        render([Layer(*body)], oblique(case.specimen.axis), 56, cube, True).show(ax)
+        render([Layer(*body)], view, 56, cube, True).show(ax)
         style.headline(ax, title, panel)
-    style.scale_bar(axes[0], voxel_um)
+    style.scale_bar(axes[0, 0], voxel_um)
     style.save(fig, outputs)
 
 
@@ -116,18 +110,20 @@ def region(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 8: (a) the region in the whole foam, (b) its mesh close up."""
     mesh, facts = case.mesh("micro"), case.mesh_facts("micro")
     view = oblique(case.specimen.axis)
-    fig = style.figure(96)
-    left, right = fig.subplots(1, 2)
     layers = [_outside(case), Layer(mesh.points, boundary(mesh)[0], style.BLUE)]
-    render(layers, view, 80, shadows=True).show(left)
-    style.headline(left, "region (blue) in the foam (grey)", 0)
-    _close_up(right, mesh, case, view)
-    style.headline(right, "its mesh close up", 1)
-    for ax in (left, right):
+    pictures = {
+        "region (blue) in the foam (grey)": render(layers, view, 80, shadows=True),
+        "its mesh close up": _close_up(mesh, case, view),
+    }
+    tallest = max(picture.aspect for picture in pictures.values())
+    fig, axes = style.panels(1, 2, tallest, spare=18, below=8)
+    for panel, (ax, (title, picture)) in enumerate(zip(axes[0], pictures.items(), strict=True)):
+        picture.show(ax)
+        style.headline(ax, title, panel)
         style.scale_bar(ax, case.voxel_um())
     counts = f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra"
-    text = f"{counts} of {facts['mean_volume']:.2f} voxel³"
-    style.note(right, text, 0, -0.11, ha="left", fontsize=8)
+    text = f"micro mesh: {counts} of {facts['mean_volume']:.2f} voxel³ in the mean"
+    fig.supxlabel(text, fontsize=8.5)
     style.save(fig, outputs)
 
 
@@ -139,7 +135,7 @@ def _outside(case: Case) -> Layer:
     return Layer(points, faces[depth < 0])
 
 
-def _close_up(ax, mesh, case: Case, view) -> None:
+def _close_up(mesh: Mesh, case: Case, view: View) -> Picture:
     """Edges of the mesh in a box of 0.8 cell around its densest place near the middle."""
     half = 0.4 * case.cell_size
     where = centroids(mesh)
@@ -151,7 +147,7 @@ def _close_up(ax, mesh, case: Case, view) -> None:
     faces, _ = boundary(mesh, in_box(where, centre - half, centre + half))
     points, faces, _ = compact(mesh.points, faces)
     layer = Layer(points, faces, PALE_BLUE, edges=True, line_width=1.5)
-    render([layer], view, 80).show(ax)
+    return render([layer], view, 80)
 
 
 def penalised(case: Case, outputs: Iterable[str]) -> None:
@@ -161,13 +157,13 @@ def penalised(case: Case, outputs: Iterable[str]) -> None:
     faces, _ = boundary(mesh)
     on_faces = colours[kind[faces].max(axis=1)]
     axis = case.specimen.axis
-    fig = style.figure(88)
-    axes = fig.subplots(1, 2)
     views = {"from the side": oblique(axis), "from above": oblique(axis, 35, 75)}
-    for panel, (ax, (name, view)) in enumerate(zip(axes, views.items(), strict=True)):
+    tallest = max(aspect(view, mesh.points) for view in views.values())
+    fig, axes = style.panels(1, 2, tallest, spare=20, below=10)
+    for panel, (ax, (name, view)) in enumerate(zip(axes[0], views.items(), strict=True)):
         render([Layer(mesh.points, faces, on_faces)], view, 80, shadows=True).show(ax)
         style.headline(ax, name, panel)
-    style.scale_bar(axes[0], case.voxel_um())
+        style.scale_bar(ax, case.voxel_um())
     names = ("equilibrium gap", "curvature, ends", "curvature, sides")
     handles = [
         style.line(tuple(c / 255), f"{name}, {np.sum(kind == n):,} nodes", "", "s")

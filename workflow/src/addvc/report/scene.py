@@ -59,6 +59,11 @@ class Picture:
     image: np.ndarray
     extent: tuple[float, float, float, float]
 
+    @property
+    def aspect(self) -> float:
+        """Height over width."""
+        return self.image.shape[0] / self.image.shape[1]
+
     def show(self, ax: Axes) -> None:
         """Draw it without axes, one voxel as long in either direction."""
         ax.imshow(self.image, extent=self.extent)

@@ -37,16 +37,17 @@ def platen_grid(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 6: (a) the hexahedral grid over a slice that holds both platens, (b) in space."""
     volume, voxel_um = case.image(0)
     specimen, grid = case.specimen, case.mesh("grid")
-    fig = style.figure(88)
-    left, right = fig.subplots(1, 2, width_ratios=(1, 1))
-    _grid_over_slice(left, volume, specimen, grid.points)
-    style.scale_bar(left, voxel_um)
-    style.headline(left, "grid over the middle slice", 0)
-    view = oblique(specimen.axis)
     points, faces = whole_foam(volume, case.gamma, specimen, specimen.low, specimen.high)
     edges = _edges(boundary(grid)[0])
     layers = [Layer(points, faces), Layer(grid.points, edges, style.BLUE, line_width=5)]
-    render(layers, view, 80, shadows=True).show(right)
+    picture = render(layers, oblique(specimen.axis), 80, shadows=True)
+    slice_aspect = volume.shape[specimen.axis] / volume.shape[specimen.across[1]]
+    fig, axes = style.panels(1, 2, max(picture.aspect, slice_aspect), spare=15)
+    left, right = axes[0]
+    picture.show(right)
+    _grid_over_slice(left, volume, specimen, grid.points)
+    style.scale_bar(left, voxel_um)
+    style.headline(left, "grid over the middle slice", 0)
     cells = f"{len(grid.cells)} hexahedra, {len(grid.points)} nodes"
     style.headline(right, cells, 1)
     style.save(fig, outputs)
@@ -66,15 +67,8 @@ def _grid_over_slice(ax: Axes, volume: np.ndarray, specimen: Specimen, nodes: np
         if not 0 < face < plane.shape[1] - 1:
             continue  # no platen in the image at this end
         ax.axhline(face, color=style.ORANGE, lw=1.2, ls="--")
-        ax.text(
-            0.02 * plane.shape[0],
-            face + shift,
-            "platen",
-            color=style.ORANGE,
-            va=side,
-            fontsize=8,
-            fontweight="bold",
-        )
+        words = {"color": style.ORANGE, "fontsize": 8, "fontweight": "bold"}
+        ax.text(0.02 * plane.shape[0], face + shift, "platen", va=side, **words)
     ax.set_axis_off()
 
 

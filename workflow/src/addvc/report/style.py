@@ -169,7 +169,12 @@ def save(fig: Figure, outputs: Iterable[str | Path]) -> None:
     for name in outputs:
         vector = Path(name).suffix == ".svg"
         with atomic_path(name) as temporary:
-            fig.savefig(temporary, metadata={"Date": None} if vector else {"Software": None})
+            fig.savefig(
+                temporary,
+                bbox_inches="tight",  # pictures of a fixed aspect may push words over the border
+                pad_inches=0.02,
+                metadata={"Date": None} if vector else {"Software": None},
+            )
     plt.close(fig)
 
 
