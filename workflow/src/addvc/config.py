@@ -128,7 +128,8 @@ def scan_files(path: str) -> list[str]:
     place = Path(path)
     if place.is_file():
         return [path]
-    found = sorted(map(str, place.glob("*.tif*"))) if place.is_dir() else sorted(glob.glob(path))
+    slices = [file for file in place.glob("[!.]*") if file.suffix.lower() in (".tif", ".tiff")]
+    found = sorted(map(str, slices)) if place.is_dir() else sorted(glob.glob(path))
     if not found:
         raise ConfigError(
             f"scan {path} was not found (0 files; at least 1); paths start at {Path.cwd()}: correct "

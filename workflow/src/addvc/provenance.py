@@ -8,6 +8,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent
 
 
+@cache
 def imported_modules(path: Path) -> set[Path]:
     """Files of this package that a Python file imports, at any depth of its syntax."""
     names = set()

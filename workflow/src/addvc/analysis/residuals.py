@@ -17,8 +17,10 @@ def residual_on(reference: Reference, deformed: np.ndarray, u: np.ndarray) -> di
     weight = reference.quadrature.weight
     statistics = residual_statistics(r, inside, weight)
     scaled = (r[inside] - statistics["mean"]) / max(statistics["std"], 1e-12)
+    total = weight[inside].sum()  # none when the whole displacement has left the image
     for name, power, normal in (("skewness", 3, 0.0), ("kurtosis", 4, 3.0)):
-        statistics[name] = float(np.average(scaled**power, weights=weight[inside]) - normal)
+        moment = (weight[inside] * scaled**power).sum() / total if total else np.nan
+        statistics[name] = float(moment - normal)
     return {"r": r, "inside": inside, "weight": weight, "statistics": statistics}
 
 

@@ -111,7 +111,9 @@ def costs(folder: Path) -> dict:
     result: dict[str, dict] = {}
     for path in sorted(folder.rglob("*.tsv")):
         with path.open() as file:
-            row = next(csv.DictReader(file, delimiter="\t"))
+            row = next(csv.DictReader(file, delimiter="\t"), None)
+        if row is None:  # of a job that is ending just now
+            continue
         number = {key: _number(row.get(key)) for key in ("cpu_time", "s", "max_rss")}
         first, *_ = path.relative_to(folder).parts
         rule = path.stem if first == "figures" else first

@@ -1,6 +1,7 @@
 """The HTML report: snakemake's own, called on the figures once they are made."""
 
 import logging
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -32,7 +33,8 @@ def build_report(output: str | Path, snakefile: str, config: str, target: str) -
             "--cores",
             "1",
         ]
-        done = subprocess.run(command, capture_output=True, text=True)
+        quiet = os.environ | {"PYTHONWARNINGS": "ignore::RuntimeWarning"}  # of its own coroutines
+        done = subprocess.run(command, capture_output=True, text=True, env=quiet)
         log.info("%s", done.stderr.strip())
         if done.returncode:
             raise AddvcError(

@@ -45,7 +45,9 @@ def micro_name(summary: dict) -> str:
 
 
 def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
-    """A table in reStructuredText."""
+    """A table in reStructuredText; "None." in place of one without rows."""
+    if not rows:
+        return ["", "None.", ""]
     lines = ["", ".. list-table::", "   :header-rows: 1", ""]
     for row in [header, *rows]:
         lines += [("   * - " if n == 0 else "     - ") + str(cell) for n, cell in enumerate(row)]
@@ -107,6 +109,13 @@ def warnings(summary: dict) -> list[str]:
                     "voxel). Look at the residual maps (Fig. 13); a longer "
                     "regularisation length or a better start may help."
                 )
+        doubtful = 1 - state[micro_name(summary)]["valid_nodes"]
+        if state["verdict"] == "flagged" and doubtful > 0.05:
+            found.append(
+                f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
+                "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
+                "look at the residual maps (Fig. 13)."
+            )
         if state["verdict"] == "failed":
             found.append(
                 f"- State {state['state']} could not be registered: over half of its nodes "
@@ -195,7 +204,12 @@ def cost_table(cost: dict) -> list[str]:
 def scans_table(scans: dict) -> list[str]:
     """The input files with their fingerprints."""
     rows = [
-        [row["path"], " x ".join(map(str, row["shape"])), row["dtype"], row["fingerprint"][:16]]
+        [
+            f"``{row['path']}``",
+            " x ".join(map(str, row["shape"])),
+            row["dtype"],
+            row["fingerprint"][:16],
+        ]
         for row in scans["scans"]
     ]
     return list_table(["file", "shape, voxels", "type", "fingerprint"], rows)

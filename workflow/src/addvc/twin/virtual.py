@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from addvc.errors import ConfigError
 from addvc.images.files import write_json
 from addvc.images.levels import to_coarse
 
@@ -55,7 +56,7 @@ class VirtualField:
             if np.abs(new - u).max() < 1e-12:
                 return new
             u = new
-        raise ValueError(
+        raise ConfigError(
             f"virtual state {state} folds the image: amplitude {self.amplitude} voxels over waves of "
             f"{self.wavelength}; lower the amplitude or the strain"
         )
@@ -76,7 +77,10 @@ def warp(
     """Scan (nx, ny, nz) of a virtual state, in the type of `volume`, at the scan's own resolution.
 
     The reference is interpolated by cubic splines; beyond its border the nearest voxel is taken."""
+    spans = [np.arange(0, n / bin, field.wavelength / 8) for n in volume.shape]
+    field.displacement(np.stack(np.meshgrid(*spans, indexing="ij"), -1).reshape(-1, 3), state)
     coefficients = ndimage.spline_filter(volume, 3, np.float32, mode="mirror")
+    last = np.array(volume.shape) - 1
     rng = np.random.default_rng([seed, state])
     grid = np.stack(
         np.meshgrid(*(np.arange(n, dtype=float) for n in volume.shape[1:]), indexing="ij"), -1
@@ -86,8 +90,9 @@ def warp(
     for i in range(volume.shape[0]):
         y = np.column_stack([np.full(len(grid), float(i)), grid])
         source = y - bin * field.pulled_back(to_coarse(y, bin), state)
+        source = np.clip(source, 0, last)
         grey = ndimage.map_coordinates(
-            coefficients, source.T, order=3, prefilter=False, mode="nearest", output=np.float32
+            coefficients, source.T, order=3, prefilter=False, mode="mirror", output=np.float32
         )
         grey += noise * rng.standard_normal(len(grey)).astype(np.float32)
         if limits is not None:
