@@ -18,7 +18,8 @@ SCANS = {
 }
 MESH = {
     "nodes": 283, "cells": 1112, "mean_edge": 12.06, "mean_volume": 147.5, "min_dihedral": 10.2,
-    "ultimate_error": 2.1e-3, "kept_fraction": 0.99, "voxel_kept_fraction": 0.98,
+    "ultimate_error": 2.1e-3, "ultimate_converged": True,
+    "kept_fraction": 0.99, "voxel_kept_fraction": 0.98,
 }  # fmt: skip
 ERROR = {"median": 0.0325, "p95": 0.0838, "rms": 0.045}
 

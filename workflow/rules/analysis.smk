@@ -132,5 +132,6 @@ rule summary:
         states=LABELS,
         finest=FINEST,
         axis=AXIS,
+        truth=HAS_TRUTH,
     script:
         "../scripts/analysis/summary.py"

@@ -37,6 +37,7 @@ rule report:
         FIGURES,
         page=R + "/report/front.rst",
         config=R + "/report/config.json",
+        captions=sorted(map(str, (WORKFLOW / "report").glob("*.rst"))),
     output:
         R + "/report.html",
     log:

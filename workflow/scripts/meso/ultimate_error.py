@@ -1,7 +1,6 @@
 """Table 2: the ultimate error of a meso mesh, by sub-voxel shifts."""
 
 from addvc.correlation.meso import meso_options, meso_system
-from addvc.correlation.register import Stop
 from addvc.correlation.ultimate import ultimate_error
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json, write_json
@@ -15,4 +14,4 @@ with job(snakemake):
     coefficients = load_volume(source.reference)[0]
     system = meso_system(read_mesh(source.mesh), coefficients, options)
     shifts = params.ultimate_error["shifts"]
-    write_json(snakemake.output[0], ultimate_error(system, coefficients, shifts, Stop(1e-6, 50)))
+    write_json(snakemake.output[0], ultimate_error(system, coefficients, shifts))

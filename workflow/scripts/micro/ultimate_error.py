@@ -1,7 +1,7 @@
 """Table 2: the ultimate error of micro DVC, by sub-voxel shifts."""
 
 from addvc.correlation.micro import micro_reference
-from addvc.correlation.register import Stop, System
+from addvc.correlation.register import System
 from addvc.correlation.store import load_factor
 from addvc.correlation.ultimate import ultimate_error
 from addvc.fem.io import read_mesh
@@ -16,4 +16,4 @@ with job(snakemake):
     factor, extra, _ = load_factor(source.factor)
     shifts = snakemake.params.ultimate_error["shifts"]
     system = System(reference, extra, factor)
-    write_json(snakemake.output[0], ultimate_error(system, coefficients, shifts, Stop(1e-6, 50)))
+    write_json(snakemake.output[0], ultimate_error(system, coefficients, shifts))

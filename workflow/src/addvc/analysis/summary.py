@@ -30,7 +30,13 @@ PACKAGES = (
 
 
 def summarise(
-    case: str, folder: str | Path, meshes: list[str], states: dict[int, str], finest: str, axis: int
+    case: str,
+    folder: str | Path,
+    meshes: list[str],
+    states: dict[int, str],
+    finest: str,
+    axis: int,
+    truth: bool,
 ) -> dict:
     """The summary of results/CASE (`folder`): `meshes` from meso to micro, `states` with labels."""
     folder = Path(folder)
@@ -45,7 +51,7 @@ def summarise(
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
         "states": [
-            state_figures(folder, state, label, meshes, finest, axis)
+            state_figures(folder, state, label, meshes, finest, axis, truth)
             for state, label in states.items()
         ],
         "cost": costs(folder / "benchmarks"),
@@ -59,30 +65,19 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
     name = "micro" if mesh.startswith("micro") else mesh
     figures = read_json(folder / f"geometry/{name}.json")
     error = read_json(folder / f"analysis/ultimate_{mesh}.json")
-    return figures | {"ultimate_error": error["ultimate_error"]}
+    return figures | {
+        "ultimate_error": error["ultimate_error"],
+        "ultimate_converged": error["converged"],
+    }
 
 
 def state_figures(
-    folder: Path, state: int, label: str, meshes: list[str], finest: str, axis: int
+    folder: Path, state: int, label: str, meshes: list[str], finest: str, axis: int, truth: bool
 ) -> dict:
     """Verdict, measured strain and the figures of each mesh for one state."""
     micro = next(mesh for mesh in meshes if mesh.startswith("micro"))
     result = {"state": state, "label": label}
-    for mesh in meshes:
-        solution, _ = load_solution(folder / f"dvc/{mesh}_state{state}.h5")
-        errors = folder / f"analysis/error_{mesh}_state{state}.json"
-        residual = read_json(folder / f"analysis/residual_{mesh}_state{state}.json")
-        _, _, point, _ = read_vtu(folder / f"fields/{mesh}_state{state}.vtu")
-        result[mesh] = {
-            "converged": solution.converged,
-            "iterations": solution.iterations,
-            "last_step": solution.history[-1],
-            "residual_std": residual["std"],
-            "residual_mean": residual["mean"],
-            "valid_nodes": float(point["valid"].mean()),
-            "seconds": solution.seconds,
-            "error": read_json(errors) if errors.exists() else None,
-        }
+    result |= {mesh: result_figures(folder, mesh, state, truth) for mesh in meshes}
     points, _, point, _ = read_vtu(folder / f"fields/{finest}_state{state}.vtu")
     strain = shortening(points[:, axis], point["displacement"][:, axis])
     best = result[micro]
@@ -93,6 +88,24 @@ def state_figures(
         "candidates": notes["candidates"],
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": None,
+    }
+
+
+def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
+    """Convergence, residual, validity and, with a truth, the error of one mesh in one state."""
+    name = f"{mesh}_state{state}"
+    solution, _ = load_solution(folder / f"dvc/{name}.h5")
+    residual = read_json(folder / f"analysis/residual_{name}.json")
+    _, _, point, _ = read_vtu(folder / f"fields/{name}.vtu")
+    return {
+        "converged": solution.converged,
+        "iterations": solution.iterations,
+        "last_step": solution.history[-1],
+        "residual_std": residual["std"],
+        "residual_mean": residual["mean"],
+        "valid_nodes": float(point["valid"].mean()),
+        "seconds": solution.seconds,
+        "error": read_json(folder / f"analysis/error_{name}.json") if truth else None,
     }
 
 
@@ -107,16 +120,17 @@ def shortening(position: np.ndarray, displacement: np.ndarray) -> float:
 
 
 def costs(folder: Path) -> dict:
-    """CPU seconds, wall seconds and peak memory of each rule, over its jobs, from benchmarks."""
+    """CPU seconds, wall seconds and peak memory of each rule, over its jobs, from benchmarks.
+
+    Figures are left out: they are drawn while this is read."""
     result: dict[str, dict] = {}
-    for path in sorted(folder.rglob("*.tsv")):
+    for path in sorted(set(folder.rglob("*.tsv")) - set(folder.glob("figures/*"))):
         with path.open() as file:
             row = next(csv.DictReader(file, delimiter="\t"), None)
         if row is None:  # of a job that is ending just now
             continue
         number = {key: _number(row.get(key)) for key in ("cpu_time", "s", "max_rss")}
-        first, *_ = path.relative_to(folder).parts
-        rule = path.stem if first == "figures" else first
+        rule = path.relative_to(folder).parts[0]
         entry = result.setdefault(rule, {"jobs": 0, "cpu_s": 0.0, "wall_s": 0.0, "max_rss_mb": 0.0})
         entry["jobs"] += 1
         entry["cpu_s"] += number["cpu_time"]

@@ -128,7 +128,8 @@ def rescale(
 ) -> tuple[Solution, list[float]]:
     """Eq. 6, 7: the start w (n, 3) scaled along x, y, z by the image alone, and the factors.
 
-    A scaling that raises sigma(r) is refused: w itself comes back, with factors of one."""
+    A scaling that raises sigma(r), or moves over 1 % of the points out of the image, is refused: w
+    itself comes back, with factors of one."""
     h = hessian(reference, node_pattern(reference.mesh))
 
     def sigma(u):
@@ -141,7 +142,8 @@ def rescale(
     solve = reduced_solve(h, scaling_basis(w))
     solution = gauss_newton(downhill, solve, w, stop.tolerance, stop.max_iterations)
     before, after = sigma(w), sigma(solution.u)
-    if not after["std"] <= before["std"]:
+    lost = after["outside"] > before["outside"] + 0.01 * len(reference.quadrature)
+    if lost or not after["std"] <= before["std"]:
         log.info("rescale refused: sigma(r) %.3f -> %.3f", before["std"], after["std"])
         return replace(solution, u=w, residual=before, converged=False), [1.0, 1.0, 1.0]
     factors = scale_factors(solution.u, w)

@@ -13,28 +13,33 @@ from addvc.images.spline import spline_value, spline_value_gradient
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """I_r on the quadrature of a mesh: grey levels (Q,), gradient (Q, 3) per voxel."""
+    """I_r on the quadrature of a mesh: grey levels (Q,), gradient (Q, 3) per voxel, inside (Q,).
+
+    Points outside of I_r itself have neither grey level nor gradient."""
 
     mesh: Mesh
     quadrature: Quadrature
     grey: np.ndarray
     gradient: np.ndarray
+    inside: np.ndarray
 
 
 def reference_on(mesh: Mesh, quadrature: Quadrature, coefficients: np.ndarray) -> Reference:
     """Sample the spline of I_r (Eq. 4) at the points of a quadrature."""
-    grey, gradient, _ = spline_value_gradient(coefficients, quadrature.points)
-    return Reference(mesh, quadrature, grey, gradient)
+    grey, gradient, inside = spline_value_gradient(coefficients, quadrature.points)
+    return Reference(mesh, quadrature, grey, gradient, inside)
 
 
 def residual(
     reference: Reference, deformed: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eq. 5: r = I_r(x) - I_d(x + u(x)) (Q,) and inside (Q,); r = 0 where x + u has left I_d."""
+    """Eq. 5: r = I_r(x) - I_d(x + u(x)) (Q,) and inside (Q,); r = 0 where x is not
+    in I_r or x + u has left I_d."""
     quadrature = reference.quadrature
     moved = interpolate(reference.mesh.cells, quadrature.cell, quadrature.shape, u)
     moved += quadrature.points
     grey, inside = spline_value(deformed, moved)
+    inside &= reference.inside
     return np.where(inside, reference.grey - grey, np.float32(0)), inside
 
 

@@ -7,10 +7,12 @@ from scipy import fft
 
 from addvc.correlation.register import Stop, System, register
 
+STOP = Stop(1e-6, 50)  # far below the error that is measured
+
 
 def fft_shift(volume: np.ndarray, shift: Sequence[float]) -> np.ndarray:
     """I(x - shift) of a volume taken as periodic (nx, ny, nz): the material moves by `shift`."""
-    spectrum = fft.rfftn(volume.astype(np.float32), workers=-1)
+    spectrum = fft.rfftn(volume.astype(np.float32))
     for axis, distance in enumerate(shift):
         n = volume.shape[axis]
         frequency = fft.rfftfreq(n) if axis == 2 else fft.fftfreq(n)
@@ -20,11 +22,11 @@ def fft_shift(volume: np.ndarray, shift: Sequence[float]) -> np.ndarray:
         shape = [1, 1, 1]
         shape[axis] = -1
         spectrum *= phase.reshape(shape)
-    return np.ascontiguousarray(fft.irfftn(spectrum, volume.shape, workers=-1), dtype=np.float32)
+    return np.ascontiguousarray(fft.irfftn(spectrum, volume.shape), dtype=np.float32)
 
 
 def ultimate_error(
-    system: System, coefficients: np.ndarray, shifts: Sequence[float], stop: Stop
+    system: System, coefficients: np.ndarray, shifts: Sequence[float], stop: Stop = STOP
 ) -> dict:
     """Error of a rigid shift (s, s, s), for each s: bias and standard deviation over nodes.
 
@@ -32,14 +34,21 @@ def ultimate_error(
     rows = []
     for shift in shifts:
         moved = fft_shift(coefficients, [shift] * 3)
-        u = register(
-            system, moved, np.zeros_like(system.reference.mesh.points), stop, f"shift {shift}"
-        ).u
+        start = np.zeros_like(system.reference.mesh.points)
+        solution = register(system, moved, start, stop, f"shift {shift}")
+        miss = solution.u - shift
         rows.append(
-            {"shift": shift, "bias": float((u - shift).mean()), "std": float((u - shift).std())}
+            {
+                "shift": shift,
+                "bias": float(miss.mean()),
+                "std": float(miss.std()),
+                "converged": solution.converged,
+                "iterations": solution.iterations,
+            }
         )
     return {
         "ultimate_error": float(np.mean([row["std"] for row in rows])),
         "unit": "voxel",
+        "converged": all(row["converged"] for row in rows),
         "shifts": rows,
     }

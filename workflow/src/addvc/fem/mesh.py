@@ -109,7 +109,7 @@ def check_mesh(mesh: Mesh, name: str, min_dihedral: float = 0.0) -> dict:
     if (volume <= 0).any():
         raise MeshError(
             f"{name}: {(volume <= 0).sum()} of {len(volume)} cells are inverted or flat (smallest "
-            f"volume {volume.min():.2e} voxel^3, must be above 0); change mesh.edge_length"
+            f"volume {volume.min():.2e} voxel^3, must be above 0); change mesh.size or meso.sizes"
         )
     report = {
         "nodes": len(mesh.points),
@@ -130,7 +130,7 @@ def check_mesh(mesh: Mesh, name: str, min_dihedral: float = 0.0) -> dict:
         raise MeshError(
             f"{name}: {(smallest < min_dihedral).sum()} of {len(volume)} tetrahedra have a dihedral "
             f"angle below {min_dihedral} degrees (smallest {smallest.min():.2g}); change "
-            "mesh.edge_length or lower mesh.min_dihedral"
+            "mesh.size or meso.sizes, or lower mesh.min_dihedral"
         )
     return report | {
         "components": 1,

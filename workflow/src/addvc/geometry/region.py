@@ -43,7 +43,7 @@ def micro_region(specimen, setting, margin: float = 3.0) -> Region:
             half = min((b - a) / 2 - margin, width)
             bounds.append(((a + b) / 2 - half, (a + b) / 2 + half))
         return Region(specimen.axis, low, high, bounds=tuple(bounds), cut_sides=True)
-    radius = wanted.get("radius", specimen.radius + margin)
+    radius = min(wanted.get("radius", np.inf), specimen.radius + margin)
     return Region(
         specimen.axis, low, high, tuple(specimen.centre), radius, cut_sides=radius < specimen.radius
     )

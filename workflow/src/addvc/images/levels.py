@@ -7,6 +7,8 @@ x_fine = factor x_coarse + (factor - 1) / 2.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from addvc.errors import ScanError
+
 
 def to_fine(x: ArrayLike, factor: float) -> NDArray:
     """Positions on the coarse level (any shape, coarse voxels) -> fine voxels."""
@@ -32,14 +34,14 @@ def bin_mean(volume: NDArray, factor: int) -> NDArray[np.float32]:
     """Block means of a volume: (nx, ny, nz) -> (nx // factor, ny // factor, nz // factor), float32.
 
     A trailing remainder smaller than `factor` is cut off. One axis after the other, each as a sum
-    of strided views, which keeps the memory order of `volume`. Raises ValueError when the factor
+    of strided views, which keeps the memory order of `volume`. Raises ScanError when the factor
     is not a whole number of at least 1 or exceeds the size.
     """
     if factor != int(factor) or factor < 1:
-        raise ValueError(f"binning factor is {factor}; use a whole number of at least 1")
+        raise ScanError(f"binning factor is {factor}; use a whole number of at least 1")
     factor = int(factor)
     if min(volume.shape) < factor:
-        raise ValueError(
+        raise ScanError(
             f"an image of {volume.shape} voxels cannot be binned by {factor}; "
             f"use a factor of at most {min(volume.shape)}"
         )
@@ -65,7 +67,7 @@ def _sum_along(volume: NDArray, factor: int, axis: int) -> NDArray[np.float32]:
 def pyramid(volume: NDArray, levels: int) -> list[NDArray[np.float32]]:
     """`levels` images, the finest first; each next one is the previous one binned by 2."""
     if levels < 1:
-        raise ValueError(f"a pyramid of {levels} levels is empty; use at least 1")
+        raise ScanError(f"a pyramid of {levels} levels is empty; use at least 1")
     images = [np.asarray(volume, dtype=np.float32)]
     for _ in range(levels - 1):
         images.append(bin_mean(images[-1], 2))

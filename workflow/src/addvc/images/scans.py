@@ -3,6 +3,7 @@
 A volume is I[i, j, k] with x = i, y = j, z = k at voxel centres, whatever the order in the file.
 """
 
+import glob
 import hashlib
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -101,7 +102,7 @@ def _to_xyz(axes: str) -> tuple[int, ...]:
 def _open_source(path: Path, fmt: ScanFormat) -> Source:
     """Choose the opener by what the path is: a pattern, a folder, or a file with a suffix."""
     if is_pattern(path):
-        return open_stack(list(path.parent.glob(path.name)), str(path))
+        return open_stack([Path(file) for file in glob.glob(str(path))], str(path))
     if not path.exists():
         where = "an absolute path" if path.is_absolute() else f"relative to {Path.cwd()}"
         raise ScanError(f"{path}: no such file or folder ({where}); correct the path")

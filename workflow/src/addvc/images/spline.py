@@ -1,9 +1,9 @@
 """Eq. 4: a volume as a cubic B-spline, its value and its gradient at any point.
 
 The voxels are the coefficients themselves (no prefilter), as in the paper: the representation
-smooths a little instead of interpolating, which keeps gradients regular. Interpolating
-coefficients are an option (`interpolating_coefficients`). Beyond the outermost voxels the
-edge voxel is repeated; points beyond the outermost voxel centres are "outside".
+smooths a little instead of interpolating, which keeps gradients regular. `interpolating_coefficients`
+gives those of the spline through the voxels. Beyond the outermost voxels the edge voxel is
+repeated; points beyond the outermost voxel centres are "outside".
 """
 
 import numba as nb

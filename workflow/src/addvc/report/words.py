@@ -118,7 +118,7 @@ def warnings(summary: dict) -> list[str]:
             )
         if state["verdict"] == "failed":
             found.append(
-                f"- State {state['state']} could not be registered: over half of its nodes "
+                f"- State {state['state']} could not be registered: at least half of its nodes "
                 "have a residual far above the noise of the images."
             )
     micro = summary["meshes"][micro_name(summary)]
@@ -174,7 +174,7 @@ def meshes_table(summary: dict) -> list[str]:
             f"{m['mean_edge']:.2f}",
             f"{m['mean_volume']:.3g}",
             f"{m['min_dihedral']:.1f}",
-            f"{m['ultimate_error']:.2e}",
+            f"{m['ultimate_error']:.2e}" + ("" if m["ultimate_converged"] else " (not converged)"),
         ]
         for name, m in summary["meshes"].items()
     ]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import tifffile
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
+
+from addvc.images.files import atomic_path
 
 from .frame import Motion
 from .options import TwinOptions
@@ -128,16 +129,13 @@ def pages(volume: np.ndarray) -> Iterator[np.ndarray]:
 
 def write_scan(path: str | os.PathLike, volume: np.ndarray) -> None:
     """Multi-page TIFF of a volume (nx, ny, nz): page = z, row = y, column = x; atomic."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial")
-    tifffile.imwrite(
-        partial,
-        pages(volume),
-        shape=volume.shape[::-1],
-        dtype=volume.dtype,
-        bigtiff=volume.nbytes > 3_000_000_000,
-        photometric="minisblack",
-        metadata={"axes": "ZYX"},
-    )
-    os.replace(partial, path)
+    with atomic_path(path) as temporary:
+        tifffile.imwrite(
+            temporary,
+            pages(volume),
+            shape=volume.shape[::-1],
+            dtype=volume.dtype,
+            bigtiff=volume.nbytes > 3_000_000_000,
+            photometric="minisblack",
+            metadata={"axes": "ZYX"},
+        )

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from addvc.errors import ConfigError
+
 SIZES = {
     "tiny": (72, 84, 72),
     "default": (120, 140, 120),
@@ -57,7 +59,7 @@ class TwinOptions:
         object.__setattr__(self, "strains", tuple(float(e) for e in self.strains))
         for failed, message in self._faults():
             if failed:
-                raise ValueError(message)
+                raise ConfigError(message)
 
     @classmethod
     def from_config(cls, config: Mapping[str, Any]) -> TwinOptions:
@@ -65,7 +67,7 @@ class TwinOptions:
         known = [f.name for f in fields(cls)]
         unknown = sorted(set(config) - set(known))
         if unknown:
-            raise ValueError(f"unknown twin keys {unknown}; the known ones are {known}")
+            raise ConfigError(f"unknown twin keys {unknown}; the known ones are {known}")
         return cls(**config)
 
     @property

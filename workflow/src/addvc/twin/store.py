@@ -7,10 +7,11 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 
 import h5py
 import numpy as np
+
+from addvc.images.files import atomic_path
 
 from .frame import Motion
 from .options import Specimen, TwinOptions
@@ -21,12 +22,8 @@ ARRAYS = ("nodes", "elements", "strut", "radii", "director", "kind")
 
 @contextmanager
 def _atomic(path: str | os.PathLike) -> Iterator[h5py.File]:
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.partial")
-    with h5py.File(partial, "w") as file:
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         yield file
-    os.replace(partial, path)
 
 
 def _write_foam(group: h5py.Group, network: Network) -> None:
