@@ -90,3 +90,33 @@ def scan_path(state):
 def scan_input(state):
     """The files of a scan."""
     return [scan_path(state)] if own_scan(state) else SCAN_FILES[state]
+
+
+def mesh_of_candidate(wildcards):
+    """`zero` starts on the coarsest mesh, `platens` on the grid."""
+    name = "grid" if wildcards.candidate == "platens" else MESO[0]
+    return f"{R}/geometry/{name}.vtu"
+
+
+def coarser(wildcards):
+    """The mesh before this one; the coarsest starts from itself."""
+    return MESO[max(MESO.index(wildcards.meso) - 1, 0)]
+
+
+def start_of(wildcards):
+    """The best start for the coarsest mesh, the coarser solution for the others."""
+    if wildcards.meso == MESO[0]:
+        return f"{R}/dvc/start_state{wildcards.state}.h5"
+    return f"{R}/dvc/{coarser(wildcards)}_state{wildcards.state}.h5"
+
+
+def on_micro(wildcards):
+    """The displacement of a result at the nodes of the micro mesh."""
+    middle = "_on_micro" if wildcards.mesh in MESO else ""
+    return f"{R}/dvc/{wildcards.mesh}{middle}_state{wildcards.state}.h5"
+
+
+def mesh_of(wildcards):
+    """The mesh of a result: every micro method shares one."""
+    name = wildcards.mesh if wildcards.mesh in MESO else "micro"
+    return f"{R}/geometry/{name}.vtu"

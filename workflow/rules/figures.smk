@@ -1,67 +1,5 @@
 # Figures and tables: one rule each, from results on disk to results/CASE/figures.
 
-FIGURE_CASE = {"root": R, "labels": LABELS, "meso": MESO, "micro": MICRO}
-FIGURES = []
-SPECIMEN = [f"{R}/geometry/specimen.json", f"{R}/geometry/threshold.json"]
-
-
-def smooth(*states):
-    """Blurred volumes of states, 0 for the reference."""
-    return expand(R + "/volumes/smooth{state}.h5", state=states)
-
-
-def meshes(*names):
-    """Meshes with their figures."""
-    return expand(R + "/geometry/{mesh}.{suffix}", mesh=names, suffix=["vtu", "json"])
-
-
-def solutions(*names):
-    """What correlation found on meshes, in every state."""
-    return expand(R + "/dvc/{mesh}_state{state}.h5", mesh=names, state=STATES)
-
-
-def residuals(*names):
-    """Residuals at the Gauss points of the micro mesh, in every state."""
-    return expand(
-        R + "/analysis/residual_{mesh}_state{state}.h5", mesh=names, state=STATES
-    )
-
-
-def fields(*names):
-    """Fields with the validity of each node, in every state."""
-    return expand(R + "/fields/{mesh}_state{state}.vtu", mesh=names, state=STATES)
-
-
-def shown(name, number, category, shows):
-    """A figure of the report and of the list of all figures, with its caption."""
-    FIGURES.append(f"{R}/figures/{name}")
-    caption = f"../report/{number}.rst"
-    words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
-    words = words.replace("table", "Table ").replace("more_", "")
-    return report(
-        FIGURES[-1],
-        category=category,
-        caption=caption,
-        labels={"figure": words, "shows": shows},
-    )
-
-
-def drawing(name):
-    """The vector version of a figure of curves, beside its picture in the report."""
-    FIGURES.append(f"{R}/figures/{name}.svg")
-    return FIGURES[-1]
-
-
-# What Fig. 15 to 17 read: both displacements on the struts, and how far to trust them.
-CARRIED = [
-    *SPECIMEN,
-    f"{R}/geometry/cell_size.json",
-    *meshes("micro"),
-    *solutions(FINEST, MICRO[0]),
-    *fields(MICRO[0]),
-    *expand(f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5", state=STATES),
-]
-
 
 rule fig03:
     input:
@@ -265,7 +203,7 @@ rule table2:
         f"{R}/geometry/cell_size.json",
         meshes(*MESO, "micro"),
         solutions(*MESO, *MICRO),
-        expand(R + "/analysis/ultimate_{mesh}.json", mesh=[*MESO, *MICRO]),
+        expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
     output:
         shown("table2_parameters.csv", "table2", "Tables", "parameters"),
     log:
@@ -507,7 +445,7 @@ if STATES and HAS_TRUTH:
             solutions(*MESO, *MICRO),
             fields(*MICRO),
             expand(
-                R + "/analysis/error_{mesh}_state{state}.json",
+                f"{R}/analysis/error_{{mesh}}_state{{state}}.json",
                 mesh=[*MESO, *MICRO],
                 state=STATES,
             ),

@@ -3,14 +3,14 @@
 
 rule cell_size:
     input:
-        volume=R + "/volumes/volume0.h5",
-        specimen=R + "/geometry/specimen.json",
+        volume=f"{R}/volumes/volume0.h5",
+        specimen=f"{R}/geometry/specimen.json",
     output:
-        R + "/geometry/cell_size.json",
+        f"{R}/geometry/cell_size.json",
     log:
         f"{R}/logs/cell_size/all.log",
     benchmark:
-        R + "/benchmarks/cell_size/all.tsv"
+        f"{R}/benchmarks/cell_size/all.tsv"
     conda:
         ENV
     threads: 1
@@ -26,14 +26,14 @@ rule cell_size:
 
 rule threshold:
     input:
-        smooth=R + "/volumes/smooth0.h5",
-        specimen=R + "/geometry/specimen.json",
+        smooth=f"{R}/volumes/smooth0.h5",
+        specimen=f"{R}/geometry/specimen.json",
     output:
-        R + "/geometry/threshold.json",
+        f"{R}/geometry/threshold.json",
     log:
         f"{R}/logs/threshold/all.log",
     benchmark:
-        R + "/benchmarks/threshold/all.tsv"
+        f"{R}/benchmarks/threshold/all.tsv"
     conda:
         ENV
     threads: 1
@@ -50,16 +50,16 @@ rule threshold:
 
 rule solid:
     input:
-        smooth=R + "/volumes/smooth0.h5",
-        specimen=R + "/geometry/specimen.json",
-        threshold=R + "/geometry/threshold.json",
+        smooth=f"{R}/volumes/smooth0.h5",
+        specimen=f"{R}/geometry/specimen.json",
+        threshold=f"{R}/geometry/threshold.json",
     output:
-        solid=R + "/geometry/solid.h5",
-        region=R + "/geometry/region.json",
+        solid=f"{R}/geometry/solid.h5",
+        region=f"{R}/geometry/region.json",
     log:
         f"{R}/logs/solid/all.log",
     benchmark:
-        R + "/benchmarks/solid/all.tsv"
+        f"{R}/benchmarks/solid/all.tsv"
     conda:
         ENV
     threads: 1
@@ -76,14 +76,14 @@ rule solid:
 
 rule surface:
     input:
-        solid=R + "/geometry/solid.h5",
-        threshold=R + "/geometry/threshold.json",
+        solid=f"{R}/geometry/solid.h5",
+        threshold=f"{R}/geometry/threshold.json",
     output:
-        R + "/geometry/surface.vtu",
+        f"{R}/geometry/surface.vtu",
     log:
         f"{R}/logs/surface/all.log",
     benchmark:
-        R + "/benchmarks/surface/all.tsv"
+        f"{R}/benchmarks/surface/all.tsv"
     conda:
         ENV
     threads: 1
@@ -98,16 +98,16 @@ rule surface:
 
 rule micro_mesh:
     input:
-        solid=R + "/geometry/solid.h5",
-        surface=R + "/geometry/surface.vtu",
-        threshold=R + "/geometry/threshold.json",
+        solid=f"{R}/geometry/solid.h5",
+        surface=f"{R}/geometry/surface.vtu",
+        threshold=f"{R}/geometry/threshold.json",
     output:
-        mesh=R + "/geometry/micro_mesh.vtu",
-        figures=R + "/geometry/micro.json",
+        mesh=f"{R}/geometry/micro_mesh.vtu",
+        figures=f"{R}/geometry/micro.json",
     log:
         f"{R}/logs/micro_mesh/all.log",
     benchmark:
-        R + "/benchmarks/micro_mesh/all.tsv"
+        f"{R}/benchmarks/micro_mesh/all.tsv"
     conda:
         ENV
     threads: 1
@@ -123,14 +123,14 @@ rule micro_mesh:
 
 rule penalised_nodes:
     input:
-        mesh=R + "/geometry/micro_mesh.vtu",
-        region=R + "/geometry/region.json",
+        mesh=f"{R}/geometry/micro_mesh.vtu",
+        region=f"{R}/geometry/region.json",
     output:
-        R + "/geometry/micro.vtu",
+        f"{R}/geometry/micro.vtu",
     log:
         f"{R}/logs/penalised_nodes/all.log",
     benchmark:
-        R + "/benchmarks/penalised_nodes/all.tsv"
+        f"{R}/benchmarks/penalised_nodes/all.tsv"
     conda:
         ENV
     threads: 1
@@ -146,15 +146,15 @@ rule penalised_nodes:
 
 rule meso_mesh:
     input:
-        specimen=R + "/geometry/specimen.json",
-        cell_size=R + "/geometry/cell_size.json",
+        specimen=f"{R}/geometry/specimen.json",
+        cell_size=f"{R}/geometry/cell_size.json",
     output:
-        mesh=R + "/geometry/{meso}.vtu",
-        figures=R + "/geometry/{meso}.json",
+        mesh=f"{R}/geometry/{{meso}}.vtu",
+        figures=f"{R}/geometry/{{meso}}.json",
     log:
-        R + "/logs/meso_mesh/{meso}.log",
+        f"{R}/logs/meso_mesh/{{meso}}.log",
     benchmark:
-        R + "/benchmarks/meso_mesh/{meso}.tsv"
+        f"{R}/benchmarks/meso_mesh/{{meso}}.tsv"
     conda:
         ENV
     threads: 1
@@ -170,15 +170,15 @@ rule meso_mesh:
 
 rule platen_grid:
     input:
-        volume=R + "/volumes/volume0.h5",
-        specimen=R + "/geometry/specimen.json",
+        volume=f"{R}/volumes/volume0.h5",
+        specimen=f"{R}/geometry/specimen.json",
     output:
-        mesh=R + "/geometry/grid.vtu",
-        lines=R + "/geometry/grid.json",
+        mesh=f"{R}/geometry/grid.vtu",
+        lines=f"{R}/geometry/grid.json",
     log:
         f"{R}/logs/platen_grid/all.log",
     benchmark:
-        R + "/benchmarks/platen_grid/all.tsv"
+        f"{R}/benchmarks/platen_grid/all.tsv"
     conda:
         ENV
     threads: 1

@@ -1,37 +1,19 @@
 # Initialisation and meso DVC: section 3.2, Eq. 6, 7, 9.
 
 
-def mesh_of_candidate(wildcards):
-    """`zero` starts on the coarsest mesh, `platens` on the grid."""
-    name = "grid" if wildcards.candidate == "platens" else MESO[0]
-    return f"{R}/geometry/{name}.vtu"
-
-
-def coarser(wildcards):
-    """The mesh before this one; the coarsest starts from itself."""
-    return MESO[max(MESO.index(wildcards.meso) - 1, 0)]
-
-
-def start_of(wildcards):
-    """The best start for the coarsest mesh, the coarser solution for the others."""
-    if wildcards.meso == MESO[0]:
-        return f"{R}/dvc/start_state{wildcards.state}.h5"
-    return f"{R}/dvc/{coarser(wildcards)}_state{wildcards.state}.h5"
-
-
 rule start:
     input:
-        reference=R + "/volumes/smooth0.h5",
-        deformed=R + "/volumes/smooth{state}.h5",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
         mesh=mesh_of_candidate,
-        lines=R + "/geometry/grid.json",
+        lines=f"{R}/geometry/grid.json",
         figures=f"{R}/geometry/{MESO[0]}.json",
     output:
-        R + "/dvc/start-{candidate}_state{state}.h5",
+        f"{R}/dvc/start-{{candidate}}_state{{state}}.h5",
     log:
-        R + "/logs/start/{candidate}_state{state}.log",
+        f"{R}/logs/start/{{candidate}}_state{{state}}.log",
     benchmark:
-        R + "/benchmarks/start/{candidate}_state{state}.tsv"
+        f"{R}/benchmarks/start/{{candidate}}_state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -48,18 +30,18 @@ rule start:
 
 rule rescale:
     input:
-        reference=R + "/volumes/smooth0.h5",
-        deformed=R + "/volumes/smooth{state}.h5",
-        start=R + "/dvc/start-{candidate}_state{state}.h5",
-        grid=R + "/geometry/grid.vtu",
-        lines=R + "/geometry/grid.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        start=f"{R}/dvc/start-{{candidate}}_state{{state}}.h5",
+        grid=f"{R}/geometry/grid.vtu",
+        lines=f"{R}/geometry/grid.json",
         mesh=f"{R}/geometry/{MESO[0]}.vtu",
     output:
-        R + "/dvc/rescaled-{candidate}_state{state}.h5",
+        f"{R}/dvc/rescaled-{{candidate}}_state{{state}}.h5",
     log:
-        R + "/logs/rescale/{candidate}_state{state}.log",
+        f"{R}/logs/rescale/{{candidate}}_state{{state}}.log",
     benchmark:
-        R + "/benchmarks/rescale/{candidate}_state{state}.tsv"
+        f"{R}/benchmarks/rescale/{{candidate}}_state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -74,20 +56,20 @@ rule rescale:
 
 rule best_start:
     input:
-        reference=R + "/volumes/smooth0.h5",
-        deformed=R + "/volumes/smooth{state}.h5",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
         candidates=expand(
-            R + "/dvc/rescaled-{candidate}_state{{state}}.h5",
+            f"{R}/dvc/rescaled-{{candidate}}_state{{{{state}}}}.h5",
             candidate=config["meso"]["candidates"],
         ),
         mesh=f"{R}/geometry/{MESO[0]}.vtu",
         figures=f"{R}/geometry/{MESO[0]}.json",
     output:
-        R + "/dvc/start_state{state}.h5",
+        f"{R}/dvc/start_state{{state}}.h5",
     log:
-        R + "/logs/best_start/state{state}.log",
+        f"{R}/logs/best_start/state{{state}}.log",
     benchmark:
-        R + "/benchmarks/best_start/state{state}.tsv"
+        f"{R}/benchmarks/best_start/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -105,18 +87,18 @@ rule best_start:
 
 rule meso_dvc:
     input:
-        reference=R + "/volumes/smooth0.h5",
-        deformed=R + "/volumes/smooth{state}.h5",
-        mesh=R + "/geometry/{meso}.vtu",
-        figures=R + "/geometry/{meso}.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        mesh=f"{R}/geometry/{{meso}}.vtu",
+        figures=f"{R}/geometry/{{meso}}.json",
         coarser=lambda wildcards: f"{R}/geometry/{coarser(wildcards)}.vtu",
         start=start_of,
     output:
-        R + "/dvc/{meso}_state{state}.h5",
+        f"{R}/dvc/{{meso}}_state{{state}}.h5",
     log:
-        R + "/logs/meso_dvc/{meso}_state{state}.log",
+        f"{R}/logs/meso_dvc/{{meso}}_state{{state}}.log",
     benchmark:
-        R + "/benchmarks/meso_dvc/{meso}_state{state}.tsv"
+        f"{R}/benchmarks/meso_dvc/{{meso}}_state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -134,15 +116,15 @@ rule meso_dvc:
 
 rule meso_ultimate_error:
     input:
-        reference=R + "/volumes/smooth0.h5",
-        mesh=R + "/geometry/{meso}.vtu",
-        figures=R + "/geometry/{meso}.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        mesh=f"{R}/geometry/{{meso}}.vtu",
+        figures=f"{R}/geometry/{{meso}}.json",
     output:
-        R + "/analysis/ultimate_{meso}.json",
+        f"{R}/analysis/ultimate_{{meso}}.json",
     log:
-        R + "/logs/meso_ultimate_error/{meso}.log",
+        f"{R}/logs/meso_ultimate_error/{{meso}}.log",
     benchmark:
-        R + "/benchmarks/meso_ultimate_error/{meso}.tsv"
+        f"{R}/benchmarks/meso_ultimate_error/{{meso}}.tsv"
     conda:
         ENV
     threads: 1

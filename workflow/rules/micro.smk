@@ -3,15 +3,15 @@
 
 rule transfer:
     input:
-        mesh=R + "/geometry/{meso}.vtu",
-        micro=R + "/geometry/micro.vtu",
-        solution=R + "/dvc/{meso}_state{state}.h5",
+        mesh=f"{R}/geometry/{{meso}}.vtu",
+        micro=f"{R}/geometry/micro.vtu",
+        solution=f"{R}/dvc/{{meso}}_state{{state}}.h5",
     output:
-        R + "/dvc/{meso}_on_micro_state{state}.h5",
+        f"{R}/dvc/{{meso}}_on_micro_state{{state}}.h5",
     log:
-        R + "/logs/transfer/{meso}_state{state}.log",
+        f"{R}/logs/transfer/{{meso}}_state{{state}}.log",
     benchmark:
-        R + "/benchmarks/transfer/{meso}_state{state}.tsv"
+        f"{R}/benchmarks/transfer/{{meso}}_state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -26,15 +26,15 @@ rule transfer:
 
 rule factor:
     input:
-        mesh=R + "/geometry/micro.vtu",
-        reference=R + "/volumes/smooth0.h5",
-        cell_size=R + "/geometry/cell_size.json",
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        cell_size=f"{R}/geometry/cell_size.json",
     output:
-        R + "/dvc/{micro}_factor.h5",
+        f"{R}/dvc/{{micro}}_factor.h5",
     log:
-        R + "/logs/factor/{micro}.log",
+        f"{R}/logs/factor/{{micro}}.log",
     benchmark:
-        R + "/benchmarks/factor/{micro}.tsv"
+        f"{R}/benchmarks/factor/{{micro}}.tsv"
     conda:
         ENV
     threads: 1
@@ -51,17 +51,17 @@ rule factor:
 
 rule micro_dvc:
     input:
-        mesh=R + "/geometry/micro.vtu",
-        reference=R + "/volumes/smooth0.h5",
-        deformed=R + "/volumes/smooth{state}.h5",
-        factor=R + "/dvc/{micro}_factor.h5",
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        factor=f"{R}/dvc/{{micro}}_factor.h5",
         start=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
     output:
-        R + "/dvc/{micro}_state{state}.h5",
+        f"{R}/dvc/{{micro}}_state{{state}}.h5",
     log:
-        R + "/logs/micro_dvc/{micro}_state{state}.log",
+        f"{R}/logs/micro_dvc/{{micro}}_state{{state}}.log",
     benchmark:
-        R + "/benchmarks/micro_dvc/{micro}_state{state}.tsv"
+        f"{R}/benchmarks/micro_dvc/{{micro}}_state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -77,15 +77,15 @@ rule micro_dvc:
 
 rule micro_ultimate_error:
     input:
-        mesh=R + "/geometry/micro.vtu",
-        reference=R + "/volumes/smooth0.h5",
-        factor=R + "/dvc/{micro}_factor.h5",
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        factor=f"{R}/dvc/{{micro}}_factor.h5",
     output:
-        R + "/analysis/ultimate_{micro}.json",
+        f"{R}/analysis/ultimate_{{micro}}.json",
     log:
-        R + "/logs/micro_ultimate_error/{micro}.log",
+        f"{R}/logs/micro_ultimate_error/{{micro}}.log",
     benchmark:
-        R + "/benchmarks/micro_ultimate_error/{micro}.tsv"
+        f"{R}/benchmarks/micro_ultimate_error/{{micro}}.tsv"
     conda:
         ENV
     threads: 1

@@ -3,15 +3,15 @@
 
 rule front_page:
     input:
-        summary=R + "/summary.json",
-        scans=R + "/input.json",
+        summary=f"{R}/summary.json",
+        scans=f"{R}/input.json",
     output:
-        page=R + "/report/front.rst",
-        config=R + "/report/config.json",
+        page=f"{R}/report/front.rst",
+        config=f"{R}/report/config.json",
     log:
-        R + "/logs/front_page/all.log",
+        f"{R}/logs/front_page/all.log",
     benchmark:
-        R + "/benchmarks/front_page/all.tsv"
+        f"{R}/benchmarks/front_page/all.tsv"
     conda:
         ENV
     threads: 1
@@ -28,22 +28,22 @@ rule front_page:
 rule figures:
     input:
         FIGURES,
-        R + "/summary.json",
-        R + "/report/front.rst",
+        f"{R}/summary.json",
+        f"{R}/report/front.rst",
 
 
 rule report:
     input:
         FIGURES,
-        page=R + "/report/front.rst",
-        config=R + "/report/config.json",
+        page=f"{R}/report/front.rst",
+        config=f"{R}/report/config.json",
         captions=sorted(map(str, (WORKFLOW / "report").glob("*.rst"))),
     output:
-        R + "/report.html",
+        f"{R}/report.html",
     log:
-        R + "/logs/report/all.log",
+        f"{R}/logs/report/all.log",
     benchmark:
-        R + "/benchmarks/report/all.tsv"
+        f"{R}/benchmarks/report/all.tsv"
     conda:
         ENV
     threads: 1
@@ -60,13 +60,13 @@ rule report:
 
 rule verdicts:
     input:
-        R + "/summary.json",
+        f"{R}/summary.json",
     output:
-        R + "/verdicts.txt",
+        f"{R}/verdicts.txt",
     log:
-        R + "/logs/verdicts/all.log",
+        f"{R}/logs/verdicts/all.log",
     benchmark:
-        R + "/benchmarks/verdicts/all.tsv"
+        f"{R}/benchmarks/verdicts/all.tsv"
     conda:
         ENV
     threads: 1
@@ -75,7 +75,7 @@ rule verdicts:
         runtime=10,
     params:
         code=code("report/verdicts.py"),
-        folder=R,
+        folder=lambda wildcards, output: str(Path(output[0]).parent),
         strict=config["strict"],
     script:
         "../scripts/report/verdicts.py"

@@ -9,11 +9,11 @@ rule check_input:
     input:
         [scan_input(state) for state in GIVEN],
     output:
-        R + "/input.json",
+        f"{R}/input.json",
     log:
         f"{R}/logs/check_input/all.log",
     benchmark:
-        R + "/benchmarks/check_input/all.tsv"
+        f"{R}/benchmarks/check_input/all.tsv"
     conda:
         ENV
     threads: 1
@@ -30,14 +30,14 @@ rule check_input:
 
 rule volume:
     input:
-        checked=R + "/input.json",
+        checked=f"{R}/input.json",
         files=lambda wildcards: scan_input(int(wildcards.state)),
     output:
-        R + "/volumes/volume{state}.h5",
+        f"{R}/volumes/volume{{state}}.h5",
     log:
-        R + "/logs/volume/state{state}.log",
+        f"{R}/logs/volume/state{{state}}.log",
     benchmark:
-        R + "/benchmarks/volume/state{state}.tsv"
+        f"{R}/benchmarks/volume/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -54,13 +54,13 @@ rule volume:
 
 rule smooth:
     input:
-        R + "/volumes/volume{state}.h5",
+        f"{R}/volumes/volume{{state}}.h5",
     output:
-        R + "/volumes/smooth{state}.h5",
+        f"{R}/volumes/smooth{{state}}.h5",
     log:
-        R + "/logs/smooth/state{state}.log",
+        f"{R}/logs/smooth/state{{state}}.log",
     benchmark:
-        R + "/benchmarks/smooth/state{state}.tsv"
+        f"{R}/benchmarks/smooth/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -76,13 +76,13 @@ rule smooth:
 
 rule specimen:
     input:
-        R + "/volumes/volume0.h5",
+        f"{R}/volumes/volume0.h5",
     output:
-        R + "/geometry/specimen.json",
+        f"{R}/geometry/specimen.json",
     log:
         f"{R}/logs/specimen/all.log",
     benchmark:
-        R + "/benchmarks/specimen/all.tsv"
+        f"{R}/benchmarks/specimen/all.tsv"
     conda:
         ENV
     threads: 1

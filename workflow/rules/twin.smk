@@ -5,11 +5,11 @@ if KIND == "twin":
 
     rule twin_foam:
         output:
-            R + "/twin/foam.h5",
+            f"{R}/twin/foam.h5",
         log:
             f"{R}/logs/twin_foam/all.log",
         benchmark:
-            R + "/benchmarks/twin_foam/all.tsv"
+            f"{R}/benchmarks/twin_foam/all.tsv"
         conda:
             ENV
         threads: 1
@@ -24,13 +24,13 @@ if KIND == "twin":
 
     rule twin_mechanics:
         input:
-            R + "/twin/foam.h5",
+            f"{R}/twin/foam.h5",
         output:
-            R + "/truth/twin.h5",
+            f"{R}/truth/twin.h5",
         log:
             f"{R}/logs/twin_mechanics/all.log",
         benchmark:
-            R + "/benchmarks/twin_mechanics/all.tsv"
+            f"{R}/benchmarks/twin_mechanics/all.tsv"
         conda:
             ENV
         threads: 1
@@ -45,14 +45,14 @@ if KIND == "twin":
 
     rule twin_scan:
         input:
-            foam=R + "/twin/foam.h5",
-            motion=R + "/truth/twin.h5",
+            foam=f"{R}/twin/foam.h5",
+            motion=f"{R}/truth/twin.h5",
         output:
-            R + "/scans/state{state}.tif",
+            f"{R}/scans/state{{state}}.tif",
         log:
-            R + "/logs/twin_scan/state{state}.log",
+            f"{R}/logs/twin_scan/state{{state}}.log",
         benchmark:
-            R + "/benchmarks/twin_scan/state{state}.tsv"
+            f"{R}/benchmarks/twin_scan/state{{state}}.tsv"
         conda:
             ENV
         threads: 1
@@ -70,11 +70,11 @@ if KIND == "virtual":
 
     rule virtual_field:
         output:
-            R + "/truth/virtual.json",
+            f"{R}/truth/virtual.json",
         log:
             f"{R}/logs/virtual_field/all.log",
         benchmark:
-            R + "/benchmarks/virtual_field/all.tsv"
+            f"{R}/benchmarks/virtual_field/all.tsv"
         conda:
             ENV
         threads: 1
@@ -90,14 +90,14 @@ if KIND == "virtual":
 
     rule virtual_scan:
         input:
-            field=R + "/truth/virtual.json",
+            field=f"{R}/truth/virtual.json",
             files=SCAN_FILES[0],
         output:
-            R + "/scans/state{state}.tif",
+            f"{R}/scans/state{{state}}.tif",
         log:
-            R + "/logs/virtual_scan/state{state}.log",
+            f"{R}/logs/virtual_scan/state{{state}}.log",
         benchmark:
-            R + "/benchmarks/virtual_scan/state{state}.tsv"
+            f"{R}/benchmarks/virtual_scan/state{{state}}.tsv"
         conda:
             ENV
         threads: 1
