@@ -231,3 +231,23 @@ def test_the_page_of_keys_is_up_to_date():
     for path, spec in PLACES.items():
         if "properties" not in spec and not path.startswith("micro.region."):
             assert f"| `{path}` |" in page
+
+
+@pytest.mark.parametrize("key", ["porosity", "loading_axis"])
+def test_what_no_default_can_know_must_be_given_with_scans(key):
+    config = {"scans": {"reference": "a", "states": ["b"]}, "porosity": 0.9, "loading_axis": "y"}
+    config.pop(key)
+    with pytest.raises(ConfigError, match=f"`{key}` is missing: give"):
+        settings.check_given(config)
+
+
+def test_scans_without_states_say_what_to_do():
+    config = {"scans": {"reference": "a"}, "porosity": 0.9, "loading_axis": "y"}
+    with pytest.raises(ConfigError, match=r"scans\.states is empty"):
+        settings.check_given(config)
+
+
+def test_a_value_out_of_bounds_is_told_in_one_line():
+    schema = yaml.safe_load(reference.SCHEMA.read_text())
+    with pytest.raises(ConfigError, match="`porosity`: 92 is greater"):
+        settings.check_values({"porosity": 92}, schema)

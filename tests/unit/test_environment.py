@@ -215,8 +215,16 @@ def test_config_file_is_found_from_the_callers_folder(ready, tmp_path):
         _, calls = ready("run", *words, "-n", "my.yaml.html", cwd=tmp_path)
         assert calls[0].endswith(f"--configfile {tmp_path}/my.yaml -n my.yaml.html")
         assert calls[1] == f"threads 1 in {ready.folder}"
+    (ready.folder / "config").mkdir(exist_ok=True)
+    (ready.folder / "config/paper.yaml").touch()
     _, calls = ready("run", "--configfile", "config/paper.yaml", cwd=tmp_path)
     assert calls[0].endswith("--configfile config/paper.yaml")
+
+
+def test_missing_config_file_is_named(ready, tmp_path):
+    result, calls = ready("run", "--configfile", "none.yaml", cwd=tmp_path)
+    assert result.returncode == 1 and not calls
+    assert "none.yaml: no such configuration" in result.stderr
 
 
 def test_number_of_blas_threads_can_be_set(ready):

@@ -18,7 +18,10 @@ SCHEMA = WORKFLOW / "schemas/config.schema.yaml"
 def checked_config(config):
     """The configuration with its defaults; WorkflowError says which key is wrong, and the remedy."""
     try:
-        settings.check_keys(config, yaml.safe_load(SCHEMA.read_text()))
+        schema = yaml.safe_load(SCHEMA.read_text())
+        settings.check_keys(config, schema)
+        settings.check_values(config, schema)
+        settings.check_given(config)
         if settings.case_kind(config) == "twin":
             config.setdefault("twin", {})
         validate(config, str(SCHEMA))

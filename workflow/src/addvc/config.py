@@ -4,6 +4,9 @@ import difflib
 import glob
 from pathlib import Path
 
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import best_match
+
 from addvc.errors import ConfigError
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -37,6 +40,22 @@ def case_kind(config: dict) -> str:
             raise ConfigError("`virtual` makes the deformed states: leave out scans.states")
         return "virtual"
     return "scans"
+
+
+def check_given(config: dict) -> None:
+    """ConfigError when real scans come without what no default can know."""
+    needed = {
+        "porosity": "the share of void of your material: it sets the threshold",
+        "loading_axis": "the direction of compression, x, y or z",
+    }
+    for key, meaning in needed.items():
+        if "scans" in config and key not in config:
+            raise ConfigError(f"`{key}` is missing: give {meaning}")
+    if case_kind(config) == "scans" and not config["scans"].get("states"):
+        raise ConfigError(
+            "scans.states is empty (at least 1): list the loaded scans, or give `virtual` to have "
+            "the reference deformed by a known field"
+        )
 
 
 def state_strains(config: dict) -> list[float | None]:
@@ -119,6 +138,16 @@ def check_keys(config: dict, schema: dict, path: str = "") -> None:
             inner = next((option for option in options if "properties" in option), None)
             if inner:
                 check_keys(value, inner, f"{path}{key}.")
+
+
+def check_values(config: dict, schema: dict) -> None:
+    """ConfigError for the first value that the schema does not allow, in one line."""
+    error = best_match(Draft202012Validator(schema).iter_errors(config))
+    if error is None:
+        return
+    key = ".".join(map(str, error.absolute_path)) or "the configuration"
+    meaning = error.schema.get("description", "see config/README.md")
+    raise ConfigError(f"`{key}`: {error.message}. {meaning}")
 
 
 def scan_files(path: str) -> list[str]:

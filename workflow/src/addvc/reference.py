@@ -21,6 +21,7 @@ Made from `workflow/schemas/config.schema.yaml` by `python -m addvc.reference > 
 def rows(schema: dict, path: str = "") -> list[str]:
     """Lines of the table of one level of the schema, sections followed by their keys."""
     lines = []
+    required = schema.get("required", [])
     for key, spec in schema["properties"].items():
         name = f"{path}{key}"
         if "properties" in spec:
@@ -29,7 +30,8 @@ def rows(schema: dict, path: str = "") -> list[str]:
             lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
             lines += rows(spec, f"{name}.")
         else:
-            lines.append(f"| `{name}` | {kind(spec)} | {default(spec)} | {spec['description']} |")
+            preset = "required" if key in required else default(spec)
+            lines.append(f"| `{name}` | {kind(spec)} | {preset} | {spec['description']} |")
     return lines
 
 
@@ -58,7 +60,7 @@ def kind(spec: dict) -> str:
 def default(spec: dict) -> str:
     """The default of a key, as YAML has it."""
     if "default" not in spec:
-        return "none"
+        return "optional"
     return (
         f"`{yaml.safe_dump(spec['default'], default_flow_style=True).replace('...', '').strip()}`"
     )

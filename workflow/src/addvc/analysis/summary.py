@@ -74,12 +74,13 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
 def state_figures(
     folder: Path, state: int, label: str, meshes: list[str], finest: str, axis: int, truth: bool
 ) -> dict:
-    """Verdict, measured strain and the figures of each mesh for one state."""
+    """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh."""
     micro = next(mesh for mesh in meshes if mesh.startswith("micro"))
     result = {"state": state, "label": label}
     result |= {mesh: result_figures(folder, mesh, state, truth) for mesh in meshes}
     points, _, point, _ = read_vtu(folder / f"fields/{finest}_state{state}.vtu")
-    strain = shortening(points[:, axis], point["displacement"][:, axis])
+    trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
+    strain = shortening(points[trusted, axis], point["displacement"][trusted, axis])
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
     return result | {

@@ -8,6 +8,7 @@ than that of the voxels for struts two voxels thick: the count of voxels is what
 from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 
 from addvc.errors import GeometryError
 
@@ -53,27 +54,43 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
     if gamma < level + 2 * noise:
         raise GeometryError(
             f"the threshold {gamma:.1f} is within 2 standard deviations of the void "
-            f"({level:.1f}, noise {noise:.1f}): the porosity asks for solid where there is none; "
-            "raise porosity, or give geometry.threshold"
+            f"({level:.1f}, noise {noise:.1f}): it makes {np.mean(grey >= gamma):.0%} of the specimen "
+            "solid, void included; raise porosity, or give geometry.threshold"
         )
     return {"void": level, "solid": float(np.median(solid)), "noise": noise}
 
 
-def specimen_grey(smooth: np.ndarray, specimen, margin: float = 3.0) -> np.ndarray:
-    """Grey levels (n,) inside the specimen, `margin` voxels off the platens (their blurred faces)."""
+def specimen_mask(shape: tuple[int, int, int], specimen, margin: float = 3.0) -> np.ndarray:
+    """Voxels (nx, ny, nz) of the specimen, `margin` off the platens (their blurred faces)."""
     inner = replace(specimen, low=specimen.low + margin, high=specimen.high - margin)
-    return smooth[inner.voxel_mask(smooth.shape)]
+    return inner.voxel_mask(shape)
+
+
+def void_noise(smooth: np.ndarray, mask: np.ndarray, gamma: float, away: int = 3) -> float | None:
+    """Noise of the void at least `away` voxels from any solid, whose blurred halo is no noise.
+
+    1.48 times the median absolute deviation; None where less than 1 % of the mask is that far."""
+    void = mask & ~ndimage.binary_dilation(smooth >= gamma, iterations=away)
+    if void.sum() < 0.01 * mask.sum():
+        return None
+    grey = smooth[void]
+    return 1.4826 * float(np.median(np.abs(grey - np.median(grey))))
 
 
 def find_threshold(smooth: np.ndarray, specimen, porosity: float, setting: str | float) -> dict:
     """gamma ("auto": by bisection; a number: given), what it gives, and the levels around it."""
-    grey = specimen_grey(smooth, specimen)
+    mask = specimen_mask(smooth.shape, specimen)
+    grey = smooth[mask]
     if len(grey) == 0:
         raise GeometryError(f"the specimen holds no voxel ({specimen}); check scans.platens")
     gamma, trials = bisect_threshold(grey, porosity) if setting == "auto" else (setting, [])
-    return {
+    levels = check_contrast(grey, gamma)
+    far = void_noise(smooth, mask, gamma)
+    return levels | {
         "threshold": float(gamma),
         "porosity": float(np.mean(grey < gamma)),
         "target": porosity,
         "trials": trials,
-    } | check_contrast(grey, gamma)
+        "noise": levels["noise"] if far is None else far,
+        "noise_from": "all void" if far is None else "void 3 voxels off the solid",
+    }

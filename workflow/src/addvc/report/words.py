@@ -128,6 +128,12 @@ def warnings(summary: dict) -> list[str]:
             f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
             "and was left out; lower mesh.size, the porosity or images.blur."
         )
+    if not any(state[micro_name(summary)]["error"] for state in summary["states"]):
+        found.append(
+            "- The error on these images is not known: the residual and the ultimate error "
+            "bound it from below only. `virtual` in the configuration measures it for a "
+            "smooth field on your own reference."
+        )
     return found or ["None."]
 
 
@@ -186,7 +192,7 @@ def meshes_table(summary: dict) -> list[str]:
             "mean edge, voxel",
             "mean volume, voxel^3",
             "least dihedral angle, degrees",
-            "ultimate error, voxel",
+            "ultimate error (rigid shift: a lower bound), voxel",
         ],
         rows,
     )
