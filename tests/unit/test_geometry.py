@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from addvc.errors import GeometryError
+from addvc.errors import GeometryError, MeshError
 from addvc.fem.mesh import (
     Mesh,
     boundary_faces,
@@ -23,7 +23,7 @@ from addvc.geometry.cell_size import (
     secondary_peak,
 )
 from addvc.geometry.grid import grid_lines, hex_grid
-from addvc.geometry.meso import meso_mesh, specimen_surface
+from addvc.geometry.meso import meso_mesh
 from addvc.geometry.region import ENDS, FREE, SIDES, caps_depth, micro_region, node_classes
 from addvc.geometry.surface import (
     Surface,
@@ -327,13 +327,25 @@ def test_meso_mesh_has_its_edge_and_the_volume_of_the_specimen(specimen):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_outline_of_a_cylinder_has_its_area_whatever_its_axis(axis):
+def test_meso_mesh_of_a_cylinder_is_in_its_place_whatever_its_axis(axis):
     specimen = Specimen("cylinder", axis, 5.0, 45.0, (20.0, 22.5), radius=15.0)
-    surface = specimen_surface(specimen, 6.0)
-    check_watertight(surface, "outline")
-    assert enclosed_volume(surface) == pytest.approx(np.pi * 15**2 * 40, rel=1e-3)
+    mesh = meso_mesh(specimen, 6.0)
+    assert cell_volumes(mesh).sum() == pytest.approx(np.pi * 15**2 * 40, rel=1e-9)
     middle = np.insert([20.0, 22.5], axis, 25.0)
-    assert_allclose((surface.points.min(0) + surface.points.max(0)) / 2, middle, atol=0.5)
+    assert_allclose((mesh.points.min(0) + mesh.points.max(0)) / 2, middle, atol=0.5)
+
+
+@pytest.mark.parametrize("specimen", [CYLINDER, BOX], ids=["cylinder", "box"])
+def test_meso_mesh_is_the_same_twice_and_well_shaped(specimen):
+    first, second = meso_mesh(specimen, 7.0), meso_mesh(specimen, 7.0)
+    assert_array_equal(first.points, second.points)
+    assert_array_equal(first.cells, second.cells)
+    assert check_mesh(first, "meso")["min_dihedral"] > 30
+
+
+def test_a_specimen_too_small_for_a_meso_mesh_is_an_error():
+    with pytest.raises(MeshError, match=r"nearest .* too small for it; give smaller meso\.sizes"):
+        meso_mesh(CYLINDER, 200.0)
 
 
 def test_grid_fills_its_lines_without_gap():

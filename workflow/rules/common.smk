@@ -21,7 +21,8 @@ def checked_config(config):
         schema = yaml.safe_load(SCHEMA.read_text())
         settings.check_keys(config, schema)
         settings.check_values(config, schema)
-        settings.check_given(config)
+        for warning in settings.check_given(config):
+            print(f"WARNING: {warning}", file=sys.stderr)
         if settings.case_kind(config) == "twin":
             config.setdefault("twin", {})
         validate(config, str(SCHEMA))

@@ -42,20 +42,21 @@ def case_kind(config: dict) -> str:
     return "scans"
 
 
-def check_given(config: dict) -> None:
-    """ConfigError when real scans come without what no default can know."""
-    needed = {
-        "porosity": "the share of void of your material: it sets the threshold",
-        "loading_axis": "the direction of compression, x, y or z",
-    }
-    for key, meaning in needed.items():
-        if "scans" in config and key not in config:
-            raise ConfigError(f"`{key}` is missing: give {meaning}")
-    if case_kind(config) == "scans" and not config["scans"].get("states"):
+def check_given(config: dict) -> list[str]:
+    """Warnings about real scans; ConfigError when they come without their porosity."""
+    if "scans" not in config:
+        return []
+    if "porosity" not in config:
         raise ConfigError(
-            "scans.states is empty (at least 1): list the loaded scans, or give `virtual` to have "
-            "the reference deformed by a known field"
+            "`porosity` is missing: give the share of void of your material, which "
+            "sets the threshold"
         )
+    if case_kind(config) == "scans" and not config["scans"].get("states"):
+        return [
+            "scans.states is empty: only the reference will be worked on; list the loaded scans, "
+            "or give `virtual` to have the reference deformed by a known field"
+        ]
+    return []
 
 
 def state_strains(config: dict) -> list[float | None]:

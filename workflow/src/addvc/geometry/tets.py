@@ -2,11 +2,10 @@
 
 pytetwild (fTetWild) takes any triangle soup, so that a surface that crosses itself here and there
 does no harm. Its envelope is relative to the diagonal of the bounding box: it is given in voxels
-here. It is run on one thread: with more its result depends on their timing.
+here. It never gives the same mesh twice (`geometry/meso.py` says why).
 """
 
 import contextlib
-import logging
 import os
 import tempfile
 from dataclasses import dataclass
@@ -15,10 +14,8 @@ import numpy as np
 import pytetwild
 
 from addvc.errors import MeshError
-from addvc.fem.mesh import Mesh, face_components, mean_edge_length, oriented, submesh
+from addvc.fem.mesh import Mesh, face_components, oriented, submesh
 from addvc.geometry.surface import Surface
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,6 @@ class TetOptions:
     envelope: float = 0.2
     stop_energy: float = 20.0
     passes: int = 5
-    coarsen: bool = False
 
 
 @contextlib.contextmanager
@@ -59,7 +55,6 @@ def tetrahedralise(surface: Surface, options: TetOptions) -> Mesh:
             num_opt_iter=max(options.passes, 1),
             optimize=options.passes > 0,
             num_threads=1,
-            coarsen=options.coarsen,
         )
     if len(cells) == 0:
         raise MeshError(
@@ -77,25 +72,3 @@ def largest_piece(mesh: Mesh) -> tuple[Mesh, dict]:
         "pieces": int(label.max()) + 1,
         "dropped_cells": int((~keep).sum()),
     }
-
-
-def sized(surface: Surface, size: float, attempts: int = 8, tolerance: float = 0.04) -> Mesh:
-    """A mesh whose mean edge is `size` voxels within `tolerance` (relative), or the nearest tried.
-
-    The mesher's response is not linear: the length asked for is scaled by the miss until sizes on
-    both sides are known, then bisected."""
-    asked, tried = size, []
-    for _ in range(attempts):
-        options = TetOptions(asked, 0.05 * size, stop_energy=10.0, passes=40, coarsen=True)
-        mesh = tetrahedralise(surface, options)
-        edge = mean_edge_length(mesh)
-        tried.append((abs(edge - size), asked, edge, mesh))
-        log.info(
-            "asked for edges of %.2f voxels: %d tets, mean edge %.2f", asked, len(mesh.cells), edge
-        )
-        if abs(edge - size) < tolerance * size:
-            break
-        short = [a for _, a, found, _ in tried if found < size]
-        long = [a for _, a, found, _ in tried if found >= size]
-        asked = np.sqrt(max(short) * min(long)) if short and long else asked * size / edge
-    return min(tried, key=lambda one: one[0])[3]
