@@ -130,11 +130,6 @@ def test_the_first_micro_method_is_called_micro():
     }
 
 
-def test_lengths_in_cells():
-    assert settings.cells("auto", 28.0, 2.0) == 56.0
-    assert settings.cells(35, 28.0, 2.0) == 35.0
-
-
 # ------------------------------------------------------------------------------ scan files
 
 

@@ -95,11 +95,6 @@ def micro_names(config: dict) -> dict[str, str]:
     return {"micro": first} | {f"micro-{method}": method for method in others}
 
 
-def cells(value: str | float, cell_size: float, default: float) -> float:
-    """A length in voxels: as given, or `default` cell sizes for "auto"."""
-    return default * cell_size if value == "auto" else float(value)
-
-
 def scan_settings(config: dict, state: int) -> dict:
     """How to read the scan of a state: `format` (of ScanFormat), `bin`, `crop`, `voxel_size_um`.
 
