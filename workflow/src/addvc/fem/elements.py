@@ -15,6 +15,19 @@ def tet_p1(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return shape, np.broadcast_to(slopes, (len(xi), 4, 3))
 
 
+P2_EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+"""Corners at the ends of the edge of nodes 4 to 9 of a quadratic tetrahedron (VTK's order)."""
+
+
+def tet_p2(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """xi (Q, 3) -> N (Q, 10), dN (Q, 10, 3): corners L (2 L - 1), then edges 4 L_a L_b."""
+    corner, slope = tet_p1(xi)
+    a, b = P2_EDGES.T
+    shape = np.hstack([corner * (2 * corner - 1), 4 * corner[:, a] * corner[:, b]])
+    middle = 4 * (corner[:, a, None] * slope[:, b] + corner[:, b, None] * slope[:, a])
+    return shape, np.concatenate([(4 * corner - 1)[:, :, None] * slope, middle], axis=1)
+
+
 def hex_q1(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """xi (Q, 3) in [-1, 1]^3 -> N (Q, 8), dN (Q, 8, 3); VTK's order of the corners."""
     factors = 1 + xi[:, None, :] * HEX_CORNERS  # (Q, 8, 3)
