@@ -60,6 +60,13 @@ def quadratic(mesh: Mesh) -> Tetrahedra:
     return Tetrahedra(points, np.hstack([mesh.cells, middle]).astype(np.int32))
 
 
+def corners_of_nodes(mesh: Tetrahedra) -> tuple[np.ndarray, np.ndarray]:
+    """Where each node occurs: first (n + 1,) and place (10 m,), see `kernels.gathered`."""
+    nodes = mesh.cells.ravel()
+    count = np.bincount(nodes, minlength=len(mesh.points))
+    return np.append(0, np.cumsum(count)), np.argsort(nodes, kind="stable")
+
+
 class Solid:
     """Energy and its derivatives at positions x (n, 3) of the nodes of a mesh."""
 
@@ -74,7 +81,7 @@ class Solid:
         corner = mesh.points[mesh.cells[:, :4]]
         self._inverse = np.linalg.inv((corner[:, 1:] - corner[:, :1]).swapaxes(1, 2))
         self._slopes = np.ascontiguousarray(tet_p2(gauss_tet(4)[0])[1])
-        self._colours = kernels.colours(mesh.cells, len(mesh.points))
+        self._corners = corners_of_nodes(mesh)
         self.pattern: Pattern = node_pattern(mesh)
 
     @property
@@ -94,12 +101,13 @@ class Solid:
 
     def force(self, x: np.ndarray) -> np.ndarray:
         """(n, 3) gradient of the energy."""
-        return kernels.forces(x, *self._constant, *self._colours)
+        return kernels.gathered(kernels.element_forces(x, *self._constant), *self._corners)
 
     def tangent(self, x: np.ndarray) -> np.ndarray:
         """(nnz, 3, 3) Hessian of the energy: blocks on `pattern`."""
-        nnz = len(self.pattern.indices)
-        return kernels.tangents(x, *self._constant, *self._colours, self.pattern.slot, nnz)
+        pushed = kernels.pushed_forward(x, *self._constant)
+        pattern = self.pattern.slot, len(self.pattern.indices)
+        return kernels.tangents(*pushed, *self._constant[1:], *self._corners, *pattern)
 
     def matrix(self, blocks: np.ndarray) -> sparse.bsr_matrix:
         """Blocks of `tangent` as a matrix (3 n, 3 n)."""

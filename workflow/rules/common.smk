@@ -27,6 +27,7 @@ def checked_config(config):
             config.setdefault("twin", {})
         validate(config, str(SCHEMA))
         settings.meso_names(config)
+        settings.truth_file(config)
         paths = (
             [config["scans"]["reference"], *config["scans"]["states"]]
             if "scans" in config
@@ -49,8 +50,12 @@ STATES = list(LABELS)
 MESO = settings.meso_names(config)
 FINEST = MESO[-1]
 MICRO = list(settings.micro_names(config))
-HAS_TRUTH = KIND != "scans"
-TRUTH = {"twin": f"{R}/truth/twin.h5", "virtual": f"{R}/truth/virtual.json"}.get(KIND)
+TRUTH = {
+    "twin": f"{R}/truth/twin.h5",
+    "virtual": f"{R}/truth/virtual.json",
+    "scans": settings.truth_file(config),
+}[KIND]
+HAS_TRUTH = TRUTH is not None
 ENV = "../../envs/addvc.yaml"
 
 

@@ -28,6 +28,10 @@ def case_kind(config: dict) -> str:
         raise ConfigError("the configuration has both `twin` and `scans`; keep one of them")
     if "virtual" in config and "scans" not in config:
         raise ConfigError("`virtual` deforms a real scan: give scans.reference too")
+    if "truth" in config and ("scans" not in config or "virtual" in config):
+        raise ConfigError(
+            "`truth` is the displacement of your own scans: give scans, or leave truth out"
+        )
     if "scans" not in config:
         if config.get("loading_axis", "y") != "y":
             raise ConfigError(
@@ -57,6 +61,16 @@ def check_given(config: dict) -> list[str]:
             "or give `virtual` to have the reference deformed by a known field"
         ]
     return []
+
+
+def truth_file(config: dict) -> str | None:
+    """The user's own truth, None where there is none; ConfigError when it is not there."""
+    path = config.get("truth")
+    if path is not None and not Path(path).is_file():
+        raise ConfigError(
+            f"truth {path} was not found; paths start at {Path.cwd()}: correct or leave out `truth`"
+        )
+    return path
 
 
 def state_strains(config: dict) -> list[float | None]:

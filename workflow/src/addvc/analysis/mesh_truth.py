@@ -13,7 +13,7 @@ from functools import cached_property
 
 import h5py
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -29,7 +29,7 @@ STRAIGHT = 1e-3
 REACH = 1.5
 """Radius of the ball whose solid gives the axis of a strut, in diameters of struts."""
 
-SLENDER = 0.5
+SLENDER = 0.65
 """Least 1 - (second / first moment) of a piece of strut; a junction is below it."""
 
 
@@ -119,6 +119,17 @@ class MeshTruth:
         return struts_and_junctions(oriented(self.mesh), self._axes[1] > SLENDER)
 
 
+def is_mesh_truth(path: str | os.PathLike) -> bool:
+    """Whether a file is not one of `addvc.twin`, which hold a foam of beams."""
+    try:
+        with h5py.File(path) as file:
+            return "foam" not in file
+    except OSError as error:
+        raise ConfigError(
+            f"truth {path} cannot be read as HDF5 ({error}); see workflow/README.md"
+        ) from error
+
+
 def _check(points: np.ndarray, cells: np.ndarray, displacements: list[np.ndarray]) -> None:
     """MeshError for what cannot be interpolated in."""
     if cells.ndim != 2 or cells.shape[1] not in (4, 10):
@@ -161,20 +172,31 @@ def local_axes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def struts_and_junctions(mesh: Mesh, slender: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Strut (m,) of each tetrahedron and the middles (j, 3) of the pieces between struts.
+    """Strut (m,) of each tetrahedron and the middles (j, 3) of junctions.
 
-    Struts are the connected pieces of slender (m,) tetrahedra; any other has that of the nearest."""
+    Struts are the connected pieces of slender (m,) tetrahedra; any other has that of the nearest.
+    A junction is a connected piece of the others that three struts or more share nodes with."""
     centre = mesh.points[mesh.cells].mean(axis=1)
     rods, knots = np.flatnonzero(slender), np.flatnonzero(~slender)
     label = np.zeros(len(slender), dtype=np.int64)
-    if len(rods) == 0:
+    if len(rods) == 0 or len(knots) == 0:
         return label, np.zeros((0, 3))
-    label[rods] = pieces(mesh.cells[rods])
-    label[knots] = label[rods[cKDTree(centre[rods]).query(centre[knots])[1]]]
-    knot, volume = pieces(mesh.cells[knots]), cell_volumes(mesh)[knots]
+    strut, knot = pieces(mesh.cells[rods]), pieces(mesh.cells[knots])
+    label[rods] = strut
+    label[knots] = strut[cKDTree(centre[rods]).query(centre[knots])[1]]
+    n = len(mesh.points)
+    at_knot = incidence(mesh.cells[knots], knot, n)
+    meet = (at_knot.T @ incidence(mesh.cells[rods], strut, n)).tocsr()
+    volume = cell_volumes(mesh)[knots]
     total = np.bincount(knot, volume)
-    middle = [np.bincount(knot, volume * x) / total for x in centre[knots].T]
-    return label, np.stack(middle, axis=1)
+    middle = np.stack([np.bincount(knot, volume * x) / total for x in centre[knots].T], axis=1)
+    return label, middle[np.diff(meet.indptr) > 2]
+
+
+def incidence(cells: np.ndarray, label: np.ndarray, nodes: int) -> csr_matrix:
+    """(nodes, labels), not zero where a cell (m, a) of that label (m,) has the node."""
+    entries = cells.ravel(), np.repeat(label, cells.shape[1])
+    return csr_matrix((np.ones(cells.size), entries), shape=(nodes, label.max() + 1))
 
 
 def pieces(cells: np.ndarray) -> np.ndarray:

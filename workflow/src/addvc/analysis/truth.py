@@ -4,13 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
+from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth
 from addvc.twin.truth import Truth
 from addvc.twin.virtual import VirtualField
 
+AnyTruth = Truth | MeshTruth | VirtualField
 
-def load_truth(path: str | Path) -> Truth | VirtualField:
-    """The truth of the twin (.h5) or of a virtual test (.json)."""
-    return VirtualField.load(path) if Path(path).suffix == ".json" else Truth.load(str(path))
+
+def load_truth(path: str | Path) -> AnyTruth:
+    """The truth of the twin (.h5), of a virtual test (.json) or of the user's own mesh (.h5)."""
+    if Path(path).suffix == ".json":
+        return VirtualField.load(path)
+    return MeshTruth.load(path) if is_mesh_truth(path) else Truth.load(str(path))
 
 
 def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
@@ -36,7 +41,7 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     }
 
 
-def error_at(truth: Truth | VirtualField, points: np.ndarray, u: np.ndarray, state: int) -> dict:
+def error_at(truth: AnyTruth, points: np.ndarray, u: np.ndarray, state: int) -> dict:
     """Error statistics of u (n, 3) measured at points (n, 3) of the reference."""
-    tangent = truth.strut(points)[1] if isinstance(truth, Truth) else None
+    tangent = None if isinstance(truth, VirtualField) else truth.strut(points)[1]
     return error_statistics(u - truth.displacement(points, state), tangent)
