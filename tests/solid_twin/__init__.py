@@ -6,9 +6,9 @@ to run it. Lengths in voxels, axes x, y, z, compression along y.
 
 - `kernels`, `solid`: energy, force and tangent of quadratic tetrahedra, compressible neo-Hookean.
 - `system`: the tangent on the free nodes, factorised.
-- `equilibrium`: Newton's method that only goes down in energy; platens; `compress`.
+- `platens`, `equilibrium`, `compression`: contact, Newton's method that only goes down in energy, steps.
 - `foam`: a random open-cell foam as a level set, and its mesh.
 - `raster`, `imaging`: occupancy of the deformed solid, scans.
 - `fixture`: what `make.py` computed, kept in the repository; `scans.py` makes a case of it.
-- `bone`: any scan, compressed by the same solver and warped.
+- `warp`, `bone`: any scan, compressed by the same solver and warped.
 """

@@ -19,7 +19,9 @@ from addvc.analysis.mesh_truth import save_mesh_truth
 from addvc.fem.mesh import Mesh, check_mesh
 from addvc.geometry.stuffing import stuff
 from addvc.geometry.tets import largest_piece
-from solid_twin.equilibrium import Options, Press, Step, compress
+from solid_twin.compression import Step, compress
+from solid_twin.equilibrium import Options
+from solid_twin.platens import Press
 from solid_twin.scans import write_stack
 from solid_twin.solid import Solid, Tetrahedra, quadratic
 from solid_twin.warp import warp

@@ -8,16 +8,13 @@ whole step would stall a large model for the sake of one snapping strut.
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from solid_twin.platens import Contact
 from solid_twin.solid import Solid, SolidError
 from solid_twin.system import System
-
-log = logging.getLogger(__name__)
 
 LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e2
 """Times Young's modulus, per voxel^2: the first damping tried, and where Newton gives up."""
@@ -39,43 +36,6 @@ class Options:
     iterations: int = 40
     increment: float = 0.01
     least_increment: float = 1e-4
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Frictionless platens by penalty: faces at `low` and `high` along y, stiffness per node."""
-
-    nodes: np.ndarray
-    low: float
-    high: float
-    stiffness: float = 10.0
-
-    def depth(self, x: np.ndarray) -> np.ndarray:
-        """(k,) signed penetration of the nodes that may touch: above 0 in the lower platen, below
-        0 in the upper one."""
-        y = x[self.nodes, 1]
-        return np.maximum(self.low - y, 0) + np.minimum(self.high - y, 0)
-
-    def energy(self, x: np.ndarray) -> float:
-        """k/2 d^2 over the nodes."""
-        return 0.5 * self.stiffness * float(np.sum(self.depth(x) ** 2))
-
-    def force(self, x: np.ndarray) -> np.ndarray:
-        """(n, 3) gradient of the energy."""
-        force = np.zeros_like(x)
-        force[self.nodes, 1] = -self.stiffness * self.depth(x)
-        return force
-
-    def change(self, x: np.ndarray, after: Contact) -> np.ndarray:
-        """(n, 3) change of the force when the faces move and the nodes in contact stay the same."""
-        depth, force = self.depth(x), np.zeros_like(x)
-        moved = (depth > 0) * (after.low - self.low) + (depth < 0) * (after.high - self.high)
-        force[self.nodes, 1] = -self.stiffness * moved
-        return force
-
-    def touching(self, x: np.ndarray) -> np.ndarray:
-        """Nodes in contact."""
-        return self.nodes[self.depth(x) != 0]
 
 
 class Body:
@@ -190,89 +150,3 @@ class Body:
 
 def _length(vectors: np.ndarray) -> np.ndarray:
     return np.linalg.norm(vectors, axis=1)
-
-
-@dataclass(frozen=True)
-class Press:
-    """Two platens that touch a body at `low` and `high` (y, voxels); the upper one comes down."""
-
-    low: float
-    high: float
-    contact: bool = True
-
-    def held(self, points: np.ndarray) -> np.ndarray:
-        """(n,) nodes in a platen from the start: clamped to it."""
-        return (points[:, 1] <= self.low) | (points[:, 1] >= self.high)
-
-    def shift(self, points: np.ndarray, strain: float) -> np.ndarray:
-        """(n, 3) motion of the nodes clamped to the upper platen."""
-        out = np.zeros_like(points)
-        out[points[:, 1] >= self.high, 1] = -strain * (self.high - self.low)
-        return out
-
-    def on(self, nodes: np.ndarray, strain: float) -> Contact | None:
-        """Contact of the other nodes (k,) with both faces."""
-        high = self.high - strain * (self.high - self.low)
-        return Contact(nodes, self.low, high) if self.contact else None
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """An equilibrium: nominal strain, positions (n, 3), force on the upper platen, cost."""
-
-    strain: float
-    x: np.ndarray
-    force: float
-    energy: float
-    solves: int
-
-
-def compress(
-    solid: Solid,
-    press: Press,
-    strains: list[float],
-    options: Options | None = None,
-    each: Callable[[Step], None] | None = None,
-) -> list[Step]:
-    """Equilibria at the nominal strains, in steps of at most `options.increment`.
-
-    `each` is called with every step on the way. Raises SolidError, with the strain, where the
-    increment falls below `options.least_increment`."""
-    options = options or Options()
-    points = solid.mesh.points
-    held = press.held(points)
-    body = Body(solid, held)
-    x, strain, solves, found = points.copy(), 0.0, 0, []
-    increment = options.increment
-    for goal in strains:
-        while strain < goal - 1e-12:
-            target = min(strain + increment, goal)
-            before, contact = (press.on(np.flatnonzero(~held), e) for e in (strain, target))
-            shift = press.shift(points, target - strain)
-            try:
-                x, count = body.equilibrium(x, shift, before, contact, options)
-            except SolidError as error:
-                increment = (target - strain) / 2
-                if increment < options.least_increment:
-                    raise SolidError(f"at a strain of {strain:.4f}: {error}") from error
-                log.info("strain %.4f: %s", target, error)
-                continue
-            strain, solves = target, solves + count
-            increment = min(1.5 * increment, options.increment)
-            reaction = body.force(x, contact)
-            step = Step(strain, x, -_on_upper(reaction, press, points, contact, x),
-                        body.energy(x, contact), solves)  # fmt: skip
-            if each:
-                each(step)
-        found.append(step)
-    return found
-
-
-def _on_upper(
-    reaction: np.ndarray, press: Press, points: np.ndarray, contact: Contact | None, x: np.ndarray
-) -> float:
-    """y of the force that the upper platen exerts: by the clamped nodes and by contact."""
-    total = reaction[points[:, 1] >= press.high, 1].sum()
-    if contact:
-        total += contact.stiffness * np.minimum(contact.depth(x), 0).sum()
-    return float(total)

@@ -16,7 +16,7 @@ import numpy as np
 
 from addvc.fem.mesh import Mesh
 from addvc.images.files import atomic_path
-from solid_twin.equilibrium import Step
+from solid_twin.compression import Step
 from solid_twin.foam import Foam
 from solid_twin.solid import Tetrahedra, quadratic
 
@@ -27,7 +27,7 @@ ROUNDING = 2.0**-13
 
 
 @dataclass(frozen=True, eq=False)
-class Compression:
+class Record:
     """A mesh, its displacement (n, 3) in each state, and how it came about.
 
     `curve` (steps, 3): nominal strain, force on the upper platen and energy, in units of Young's
@@ -52,7 +52,7 @@ def rounded(mesh: Mesh) -> Mesh:
     return Mesh(mesh.points.astype(np.float32), mesh.cells)
 
 
-def save_compression(
+def save_record(
     path: str | os.PathLike, foam: Foam, mesh: Mesh, steps: list[Step], strains, made: dict
 ) -> None:
     """Write the states at `strains` out of all steps of a compression of `quadratic(mesh)`."""
@@ -71,15 +71,15 @@ def save_compression(
         file.attrs["made"] = json.dumps(made)
 
 
-def load_compression(path: str | os.PathLike = FIXTURE) -> Compression:
-    """What `save_compression` wrote."""
+def load_record(path: str | os.PathLike = FIXTURE) -> Record:
+    """What `save_record` wrote."""
     with h5py.File(path) as file:
         words = {
             key: tuple(value) if isinstance(value, list) else value
             for key, value in json.loads(file.attrs["foam"]).items()
         }
         strains = file.attrs["strains"][:]
-        return Compression(
+        return Record(
             Foam(**words),
             quadratic(Mesh(file["points"][:], file["cells"][:])),
             strains,

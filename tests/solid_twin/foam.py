@@ -35,13 +35,13 @@ class Foam:
     radius: float = 37.5
     cell_volume: float = 9600.0
     elongation: float = 1.1
-    strut: float = 1.1
+    strut: float = 1.25
     scatter: float = 0.08
-    flare: float = 0.3
-    blend: float = 0.45
+    flare: float = 0.15
+    blend: float = 0.3
     bow: float = 0.6
     wave: float = 10.0
-    spacing: float = 1.7
+    spacing: float = 1.75
     sampling: int = 2
     turn: tuple[float, float, float] = (0.4, 0.3, 0.7)
     seed: int = 2417

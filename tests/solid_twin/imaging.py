@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from solid_twin.fixture import Compression
+from solid_twin.fixture import Record
 from solid_twin.raster import occupancy
 
 
@@ -38,7 +38,7 @@ def correlated_noise(shape: tuple[int, ...], imaging: Imaging, state: int) -> np
     return imaging.noise * field / field.std()
 
 
-def clean_image(compression: Compression, state: int, imaging: Imaging) -> tuple[np.ndarray, float]:
+def clean_image(compression: Record, state: int, imaging: Imaging) -> tuple[np.ndarray, float]:
     """Grey levels (nx, ny, nz) of a state without noise, 0 for the reference, and the share of the
     solid that is there twice."""
     mesh, shape = compression.mesh, compression.foam.shape
@@ -55,7 +55,7 @@ def eight_bit(grey: np.ndarray) -> np.ndarray:
     return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
 
 
-def scan(compression: Compression, state: int, imaging: Imaging) -> np.ndarray:
+def scan(compression: Record, state: int, imaging: Imaging) -> np.ndarray:
     """The scan (nx, ny, nz) uint8 of a state, 0 for the reference."""
     grey, _ = clean_image(compression, state, imaging)
     return eight_bit(grey + correlated_noise(grey.shape, imaging, state))

@@ -9,9 +9,10 @@ import time
 from importlib.metadata import version
 
 from addvc.fem.mesh import check_mesh
-from solid_twin.equilibrium import Press, Step, compress
-from solid_twin.fixture import rounded, save_compression
+from solid_twin.compression import Step, compress
+from solid_twin.fixture import rounded, save_record
 from solid_twin.foam import Foam, make_foam
+from solid_twin.platens import Press
 from solid_twin.solid import Solid, quadratic
 
 log = logging.getLogger("solid_twin")
@@ -41,7 +42,7 @@ def make(path: str) -> None:
         "mesh": figures,
         "versions": {"python": sys.version.split()[0]} | {name: version(name) for name in PACKAGES},
     }
-    save_compression(path, foam, mesh, steps, STRAINS, made)
+    save_record(path, foam, mesh, steps, STRAINS, made)
 
 
 if __name__ == "__main__":

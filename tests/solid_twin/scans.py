@@ -12,13 +12,13 @@ import tifffile
 
 from addvc.analysis.mesh_truth import MeshTruth, save_mesh_truth
 from addvc.images.files import atomic_path
-from solid_twin.fixture import Compression, load_compression
+from solid_twin.fixture import Record, load_record
 from solid_twin.imaging import Imaging, scan
 
 FOLDER = "results/solid_scans"
 
 
-def solid_truth(compression: Compression) -> MeshTruth:
+def solid_truth(compression: Record) -> MeshTruth:
     """The displacement of any point of the solid."""
     mesh = compression.mesh
     return MeshTruth(
@@ -38,7 +38,7 @@ def write_stack(path: str | os.PathLike, volume: np.ndarray) -> None:
 
 def write_case(folder: str | os.PathLike, imaging: Imaging) -> None:
     """`stateN.tif`, 0 for the reference, and `truth.h5`."""
-    folder, compression = Path(folder), load_compression()
+    folder, compression = Path(folder), load_record()
     for state in range(len(compression.strains) + 1):
         write_stack(folder / f"state{state}.tif", scan(compression, state, imaging))
     mesh = compression.mesh

@@ -12,7 +12,7 @@ from addvc.errors import ConfigError
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load(reference.SCHEMA.read_text())
-SHIPPED = sorted((ROOT / "config").glob("*.yaml"))
+SHIPPED = [*sorted((ROOT / "config").glob("*.yaml")), ROOT / "tests/solid_twin/config.yaml"]
 
 
 def known_places(schema, path=""):
@@ -231,6 +231,20 @@ def test_the_page_of_keys_is_up_to_date():
 def test_the_porosity_of_real_scans_must_be_given():
     with pytest.raises(ConfigError, match="`porosity` is missing: give"):
         settings.check_given({"scans": {"reference": "a", "states": ["b"]}})
+
+
+def test_a_truth_belongs_to_real_scans(tmp_path):
+    scans = {"scans": {"reference": "a", "states": ["b"]}}
+    file = tmp_path / "truth.h5"
+    file.touch()
+    assert settings.case_kind(scans | {"truth": str(file)}) == "scans"
+    assert settings.truth_file(scans | {"truth": str(file)}) == str(file)
+    assert settings.truth_file(scans) is None
+    for other in ({"twin": {}}, {}, scans | {"virtual": {}}):
+        with pytest.raises(ConfigError, match="`truth` is the displacement of your own scans"):
+            settings.case_kind(other | {"truth": str(file)})
+    with pytest.raises(ConfigError, match=r"none\.h5 was not found; paths start at"):
+        settings.truth_file(scans | {"truth": "none.h5"})
 
 
 def test_scans_without_states_are_warned_of():

@@ -162,5 +162,5 @@ def test_meshes_that_cannot_be_interpolated_in_are_refused(block):
 def test_orientation_of_the_cells_does_not_matter(cross, rng):
     mirrored = MeshTruth(cross._points, cross._cells[:, [0, 2, 1, 3]], cross._u)
     assert isinstance(mirrored.mesh, Mesh)
-    x = rng.uniform(-0.9, 0.9, (20, 3)) + [6, 0, 0]
+    x = rng.uniform([5.1, -0.9, -0.9], [6.9, 0.9, 0.9], (20, 3))
     np.testing.assert_allclose(mirrored.strut(x)[2], cross.strut(x)[2])

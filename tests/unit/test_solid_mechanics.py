@@ -5,7 +5,9 @@ import pytest
 
 from addvc.fem.elements import gauss_tet, tet_p2
 from addvc.fem.mesh import Mesh
-from solid_twin.equilibrium import Body, Contact, Options, Press, compress
+from solid_twin.compression import compress
+from solid_twin.equilibrium import Body, Options
+from solid_twin.platens import Contact, Press
 from solid_twin.solid import Material, Solid, SolidError, Tetrahedra, quadratic
 from solid_twin.system import System
 
