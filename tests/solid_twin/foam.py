@@ -7,6 +7,7 @@ how `addvc.twin` makes its foam. The mesh is the truth: images are made from it,
 set. Its lattice is turned, so that it has nothing in common with the voxels.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,8 +124,19 @@ def bending(foam: Foam, shape: tuple[int, ...], rng: np.random.Generator) -> np.
     return np.stack(fields)
 
 
-def make_foam(foam: Foam) -> tuple[Mesh, np.ndarray]:
-    """Linear tetrahedra of the largest piece, voxels of the image, and the edges (e, 2, 3)."""
+def cut(inside: np.ndarray, foam: Foam, to_voxels: Callable) -> None:
+    """Keep, in place, what is within the cylinder and half a voxel into the platens: minimum of the
+    grid `inside` and the distances to these faces. to_voxels: grid points (n, 3) -> voxels."""
+    half = (foam.high - foam.low) / 2 + 0.5
+    for i in range(len(inside)):  # planes, since points of the whole grid would take gigabytes
+        plane = np.stack(np.mgrid[i : i + 1, : inside.shape[1], : inside.shape[2]], -1)
+        x, y, z = (to_voxels(plane.reshape(-1, 3)) - foam.centre).T
+        distance = np.minimum(foam.radius - np.hypot(x, z), half - np.abs(y))
+        inside[i] = np.minimum(inside[i], distance.reshape(inside.shape[1:]))
+
+
+def make_foam(foam: Foam) -> Mesh:
+    """Linear tetrahedra of the largest piece, in voxels of the image."""
     rng = np.random.default_rng([foam.seed, 1])
     edges = struts(foam, rng)
     turn = Rotation.from_rotvec(foam.turn)
@@ -132,16 +144,16 @@ def make_foam(foam: Foam) -> tuple[Mesh, np.ndarray]:
     corners = turn.apply(np.stack(np.meshgrid(*[(-h, h) for h in half]), -1).reshape(-1, 3))
     middle = foam.sampling * np.abs(corners).max(axis=0)
     shape = tuple(int(n) for n in 2 * middle + 1)
-    to_grid = lambda x: foam.sampling * turn.apply(x - foam.centre) + middle  # noqa: E731
-    ends = to_grid(edges.reshape(-1, 3)).reshape(-1, 2, 3)
+
+    def to_grid(x):
+        return foam.sampling * turn.apply(x - foam.centre) + middle
+
+    def to_voxels(x):
+        return turn.inv().apply((x - middle) / foam.sampling) + foam.centre
+
     radius = foam.sampling * foam.strut * np.exp(foam.scatter * rng.standard_normal(len(edges)))
+    ends = to_grid(edges.reshape(-1, 3)).reshape(-1, 2, 3)
     inside = -rods(ends, radius, foam, shape, bending(foam, shape, rng))
-    for i in range(shape[0]):  # planes, since points of a whole grid would take gigabytes
-        plane = np.stack(np.mgrid[i : i + 1, : shape[1], : shape[2]], -1).reshape(-1, 3)
-        x = turn.inv().apply((plane - middle) / foam.sampling)
-        side = foam.radius - np.hypot(x[:, 0], x[:, 2])
-        ends_ = (foam.high - foam.low) / 2 + 0.5 - np.abs(x[:, 1])
-        inside[i] = np.minimum(inside[i], np.minimum(side, ends_).reshape(shape[1:]))
+    cut(inside, foam, to_voxels)
     mesh, _ = largest_piece(stuff(inside, 0.0, foam.sampling * foam.spacing))
-    points = turn.inv().apply((mesh.points - middle) / foam.sampling) + foam.centre
-    return Mesh(points, mesh.cells), edges
+    return Mesh(to_voxels(mesh.points), mesh.cells)

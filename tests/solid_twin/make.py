@@ -24,7 +24,7 @@ PACKAGES = ("numpy", "scipy", "numba", "scikit-sparse", "pymetis", "scikit-image
 def make(path: str) -> None:
     """Foam, mesh, equilibria at STRAINS; progress to the log, the result to `path`."""
     start, foam, steps = time.process_time(), Foam(), []
-    mesh = rounded(make_foam(foam)[0])
+    mesh = rounded(make_foam(foam))
     figures = check_mesh(mesh, "foam")
     log.info("%s", figures)
 
