@@ -29,7 +29,9 @@ from solid_twin.solid import Solid
 ROOT = Path(__file__).parents[2]
 STATES = (1, 2, 3)
 CLEAN = 3.0  # grey levels
-EXCESS = {1: 1.15, 2: 1.15, 3: 1.20}  # residual over that of the noise alone; struts meet at 15 %
+EXCESS = {1: 1.15, 2: 1.15, 3: 1.25}
+"""Residual over that of the noise alone. At 15 % one part in forty of the solid has come within 4 voxels of
+another strut, whose grey levels it then sees: 7.8 grey levels there without noise, 0.95 elsewhere."""
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +49,13 @@ def corners(compression):
     """The linear mesh without the nodes of edges."""
     cells = compression.mesh.cells[:, :4]
     return Mesh(compression.mesh.points[: cells.max() + 1], cells)
+
+
+@pytest.fixture(scope="module")
+def drawn(compression):
+    """(e, 2, 3) ends of the struts as they were drawn, before they were bent."""
+    foam = compression.foam
+    return struts(foam, np.random.default_rng([foam.seed, 1]))
 
 
 @pytest.fixture(scope="module")
@@ -122,27 +131,24 @@ def test_with_noise_the_residual_is_that_of_the_noise(corners, truth, clean, sta
     assert alone.std() < found.std() < EXCESS[state] * alone.std()
 
 
-def test_tangents_are_those_of_the_struts_that_were_drawn(compression, truth):
+def test_tangents_are_those_of_the_struts_that_were_drawn(compression, drawn, truth):
     """In the middle of struts well inside; they are bent a little, the drawing is straight."""
     foam = compression.foam
-    edges = struts(foam, np.random.default_rng([foam.seed, 1]))
-    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
-    middle = edges.mean(axis=1)
+    length = np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1)
+    middle = drawn.mean(axis=1)
     away = middle - foam.centre
     inside = np.hypot(away[:, 0], away[:, 2]) < foam.radius - 6
     inside &= (np.abs(away[:, 1]) < (foam.high - foam.low) / 2 - 6) & (length > 8)
-    drawn = (edges[:, 1] - edges[:, 0])[inside] / length[inside, None]
+    along = (drawn[:, 1] - drawn[:, 0])[inside] / length[inside, None]
     _, tangent, distance = truth.strut(middle[inside])
-    angle = np.degrees(np.arccos(np.abs(np.sum(drawn * tangent, axis=1)).clip(0, 1)))
+    angle = np.degrees(np.arccos(np.abs(np.sum(along * tangent, axis=1)).clip(0, 1)))
     assert inside.sum() > 100
     assert np.median(angle) < 8 and np.percentile(angle, 90) < 20
     assert (distance < 0).mean() > 0.8, "most of these points are inside"
 
 
-def test_junctions_are_where_drawn_struts_meet(compression, truth):
-    foam = compression.foam
-    ends = struts(foam, np.random.default_rng([foam.seed, 1])).reshape(-1, 3)
-    away, _ = cKDTree(ends).query(truth.junctions)
+def test_junctions_are_where_drawn_struts_meet(drawn, truth):
+    away, _ = cKDTree(drawn.reshape(-1, 3)).query(truth.junctions)
     assert len(truth.junctions) > 50
     assert np.median(away) < 1.5
 
