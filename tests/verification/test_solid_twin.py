@@ -30,8 +30,15 @@ ROOT = Path(__file__).parents[2]
 STATES = (1, 2, 3)
 CLEAN = 3.0  # grey levels
 EXCESS = {1: 1.15, 2: 1.15, 3: 1.25}
-"""Residual over that of the noise alone. At 15 % one part in forty of the solid has come within 4 voxels of
-another strut, whose grey levels it then sees: 7.8 grey levels there without noise, 0.95 elsewhere."""
+"""Residual over that of the noise alone. At 15 % one part in forty of the solid has come within 4
+voxels of another strut and sees its grey levels: 7.8 there without noise, 0.95 elsewhere."""
+
+LARGEST = {
+    1: {"rms_normal": 0.10, "p95": 0.22},
+    2: {"rms_normal": 0.11, "p95": 0.24},
+    3: {"median": 0.15},
+}
+"""Error of micro DVC, voxels. At 15 % a few struts are lost by the method of the paper."""
 
 
 @pytest.fixture(scope="module")
@@ -164,9 +171,9 @@ def results(tmp_path_factory):
     config = yaml.safe_load((ROOT / "tests/solid_twin/config.yaml").read_text())
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
     done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile"), "--cores", "2",
-         "--directory", str(folder), "--configfile", str(folder / "config.yaml"),
-         "results/solid/summary.json"],
+        [sys.executable, "-m", "snakemake", "results/solid/summary.json", "--cores", "2",
+         "--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder),
+         "--configfile", str(folder / "config.yaml")],
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=3600,
     )  # fmt: skip
@@ -186,4 +193,6 @@ def test_the_workflow_on_the_solid_is_judged_by_its_truth(results, truth, state)
     under = residual_on(micro_reference(mesh, smooth[0]), smooth[1], u)["statistics"]["std"]
     print(f"state {state}: residual {found['residual_std']:.2f}, {under:.2f} under the truth,",
           found["error"])  # fmt: skip
-    assert found["converged"]
+    for figure, largest in LARGEST[state].items():
+        assert found["error"][figure] < largest
+    assert state == 3 or found["residual_std"] < 1.1 * under
