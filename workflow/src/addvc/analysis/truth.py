@@ -7,8 +7,10 @@ import numpy as np
 from addvc.twin.truth import Truth
 from addvc.twin.virtual import VirtualField
 
+Judge = Truth | VirtualField
 
-def load_truth(path: str | Path) -> Truth | VirtualField:
+
+def load_truth(path: str | Path) -> Judge:
     """The truth of the twin (.h5) or of a virtual test (.json)."""
     return VirtualField.load(path) if Path(path).suffix == ".json" else Truth.load(str(path))
 
@@ -36,7 +38,7 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     }
 
 
-def error_at(truth: Truth | VirtualField, points: np.ndarray, u: np.ndarray, state: int) -> dict:
+def error_at(truth: Judge, points: np.ndarray, u: np.ndarray, state: int) -> dict:
     """Error statistics of u (n, 3) measured at points (n, 3) of the reference."""
     tangent = truth.strut(points)[1] if isinstance(truth, Truth) else None
     return error_statistics(u - truth.displacement(points, state), tangent)
