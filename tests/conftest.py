@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from addvc import twin
 from addvc.fem.mesh import Mesh, boundary_faces, oriented
-from addvc.twin.frame import at_rest
+from addvc.twin.motion import at_rest
 
 SEED = 2417
 

@@ -21,6 +21,9 @@ MAY_IMPORT["twin"] = {"twin", "images", "fem", "errors"}
 NEEDED = {"output", "log", "benchmark", "conda", "threads", "resources", "params", "script"}
 WITHOUT_SCRIPT = {"all", "figures"}
 
+JUDGES = {"analysis/truth.py", "analysis/twin_check.py"}  # modules that may import the twin
+JUDGING = {"truth_error", "difficulty", "twin_check"}  # rules and scripts that may read its truth
+
 
 def imported(path):
     """Dotted names that a file imports, at any depth of its syntax, relative ones resolved."""
@@ -78,25 +81,25 @@ def test_an_import_only_goes_to_the_left():
         for name, path in files().items()
         for target in sorted(inside_addvc(path))
         if target.split(".")[0] not in MAY_IMPORT[path.parent.name]
-        and (name, target.split(".")[0]) != ("analysis/truth.py", "twin")
+        and not (name in JUDGES and target.split(".")[0] == "twin")
     ]
     assert wrong == []
 
 
-def test_only_one_module_knows_the_truth():
+def test_only_judges_know_the_truth():
     knowing = {
         name
         for name, path in files().items()
         if path.parent.name != "twin"
         and any(target.split(".")[0] == "twin" for target in inside_addvc(path))
     }
-    assert knowing == {"analysis/truth.py"}
+    assert knowing == JUDGES
 
 
 def test_nothing_that_measures_depends_on_the_truth():
-    """Not even through other modules: the scripts of all stages but the twin's and `truth_error`."""
+    """Not even through other modules: the scripts of all stages but the twin's and the judging ones."""
     measuring = [path for path in SCRIPTS if path.parent.name not in ("twin", "figures", "report")]
-    measuring = [path for path in measuring if path.stem != "truth_error"]
+    measuring = [path for path in measuring if path.stem not in JUDGING]
     wrong = [
         f"{path.stem} depends on {file.relative_to(PACKAGE)}"
         for path in measuring
@@ -107,13 +110,13 @@ def test_nothing_that_measures_depends_on_the_truth():
     assert wrong == []
 
 
-def test_only_the_error_rule_reads_the_truth():
+def test_only_judging_rules_read_the_truth():
     reading = {
         name
-        for name, (_, parts) in MAKING.items()
-        if re.search(r"\bTRUTH\b", parts.get("input", ""))
+        for name, (stage, parts) in MAKING.items()
+        if stage != "twin" and re.search(r"\bTRUTH\b", parts.get("input", ""))
     }
-    assert reading == {"truth_error"}
+    assert reading == JUDGING
 
 
 def test_no_module_imports_snakemake():

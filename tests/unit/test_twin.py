@@ -1,4 +1,4 @@
-"""The synthetic test: invariants of the foam, the frame and the truth; images against the truth."""
+"""The synthetic test: invariants of the foam, its motion and the truth; images against the truth."""
 
 from dataclasses import replace
 
@@ -10,8 +10,9 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from addvc import twin
-from addvc.twin import frame
-from addvc.twin.frame import Motion, at_rest
+from addvc.twin.motion import Motion, at_rest
+from addvc.twin.store import load_history, load_struts
+from addvc.twin.struts import platen_nodes
 
 SEED = 2417
 CLEAN = {"noise": 0.0, "cupping": 0.0, "rings": 0.0, "drift": 0.0, "dtype": "float32"}
@@ -28,8 +29,13 @@ def foam(options):
 
 
 @pytest.fixture(scope="module")
-def motions(foam, options):
-    return twin.deform(foam, options)
+def compressed(foam, options):
+    return twin.compress(foam, options)
+
+
+@pytest.fixture(scope="module")
+def motions(compressed):
+    return compressed[0]
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +119,7 @@ def test_foam_is_one_piece_between_its_platens(foam):
 def test_struts_are_thin_at_mid_span_and_thick_at_nodes(foam):
     thinnest = [2 * foam.radii[foam.strut == s].min() for s in range(foam.strut.max() + 1)]
     thickest = 2 * foam.radii[foam.kind[foam.elements] == 0]
-    assert 1.7 < np.median(thinnest) < 2.3
+    assert 1.7 < np.median(thinnest) < 2.5
     assert 3.0 < np.median(thickest) < 3.8
 
 
@@ -123,46 +129,20 @@ def test_directors_are_normal_to_their_elements(foam):
     assert np.linalg.norm(foam.director, axis=1) == pytest.approx(1.0)
 
 
-# --------------------------------------------------------------------------------- frame
-
-
-def test_rigid_motion_gives_no_force(foam):
-    k = frame.stiffness(foam.nodes, foam.elements, foam.radii)
-    spin, shift = np.array([0.2, -0.1, 0.3]), np.array([1.0, 2.0, -1.0])
-    u = np.c_[shift + np.cross(spin, foam.nodes), np.tile(spin, (len(foam.nodes), 1))]
-    assert np.abs(k @ u.ravel()).max() < 1e-9 * abs(k).max() * np.abs(u).max()
-    assert abs(k - k.T).max() < 1e-12 * abs(k).max()
-
-
-@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (1, 2, -2)])
-def test_cantilever_tip_deflection_is_pl3_over_3ei(axis):
-    length, radius, count = 100.0, 1.0, 8
-    axis = np.array(axis) / np.linalg.norm(axis)
-    nodes = np.linspace(0, length, count + 1)[:, None] * axis
-    elements = np.c_[np.arange(count), np.arange(1, count + 1)]
-    across = np.cross(axis, [0.3, 0.5, 0.8])
-    across /= np.linalg.norm(across)
-    load, fixed = np.zeros((count + 1, 6)), np.zeros((count + 1, 6), bool)
-    load[-1, :3], fixed[0] = across, True
-    k = frame.stiffness(nodes, elements, np.full((count, 2), radius))
-    u = frame.solve_frame(k, fixed.ravel(), np.zeros(fixed.size), load.ravel()).reshape(-1, 6)
-    inertia, area, shear = np.pi / 4 * radius**4, np.pi * radius**2, 0.5 / (1 + frame.POISSON)
-    exact = length**3 / (3 * inertia) + length / (frame.SHEAR_FACTOR * shear * area)
-    assert u[-1, :3] @ across == pytest.approx(exact, rel=1e-7)
-    assert u[-1, :3] @ across == pytest.approx(length**3 / (3 * inertia), rel=2e-3)
+# -------------------------------------------------------------------------------- motion
 
 
 def test_motion_starts_at_rest_follows_the_platens_and_stays_between_them(foam, motions, options):
     assert np.array_equal(motions[0].positions, foam.nodes)
-    low, high = frame.platen_nodes(foam)
+    low, high = platen_nodes(foam)
     for motion, strain in zip(motions[1:], options.strains, strict=True):
         move = np.array([0, -strain * foam.body.height, 0])
         assert motion.platens[1] - foam.body.high == pytest.approx(move[1])
         assert np.allclose(motion.positions[low], foam.nodes[low])
         assert np.allclose(motion.positions[high], foam.nodes[high] + move)
         y = motion.positions[:, 1]
-        assert y.min() >= motion.platens[0] - 1e-9
-        assert y.max() <= motion.platens[1] + 1e-9
+        assert y.min() >= motion.platens[0] - 0.1  # what the penalty lets in
+        assert y.max() <= motion.platens[1] + 0.1
         assert np.allclose(np.linalg.det(motion.rotations), 1)
 
 
@@ -223,7 +203,7 @@ def test_truth_moves_junctions_with_their_nodes(foam, motions, truth):
 
 def test_truth_is_continuous_across_struts_and_towards_the_platens(foam, truth):
     rng = np.random.default_rng(SEED)
-    centres = np.r_[twin.junctions(foam), foam.nodes[np.concatenate(frame.platen_nodes(foam))]]
+    centres = np.r_[twin.junctions(foam), foam.nodes[np.concatenate(platen_nodes(foam))]]
     x = np.repeat(centres, 40, axis=0)
     x = x + rng.uniform(-2, 2, x.shape)
     step = 1e-5 * rng.standard_normal(x.shape)
@@ -343,11 +323,12 @@ def test_scan_is_written_zyx(tmp_path):
     assert [p.name for p in (tmp_path / "scans").iterdir()] == ["a.tif"]
 
 
-def test_foam_motions_and_truth_come_back_from_disk(tmp_path, foam, motions, truth, options):
+def test_foam_motions_and_truth_come_back_from_disk(tmp_path, foam, compressed, truth, options):
+    motions, history = compressed
     twin.save_foam(tmp_path / "foam.h5", foam)
     assert twin.load_foam(tmp_path / "foam.h5").body == foam.body
     path = tmp_path / "truth.h5"
-    twin.save_motions(path, foam, motions, options)
+    twin.save_motions(path, foam, motions, options, history)
     back = twin.load_motions(path)
     assert all(
         np.array_equal(a.rotations, b.rotations) and a.platens == b.platens
@@ -358,6 +339,9 @@ def test_foam_motions_and_truth_come_back_from_disk(tmp_path, foam, motions, tru
     assert np.array_equal(loaded.displacement(x, 2), truth.displacement(x, 2))
     assert loaded.strains == (0.0, *options.strains)
     assert np.array_equal(loaded.platens, truth.platens)
+    assert np.array_equal(load_history(path)["steps"], [step.steps for step in history])
+    final = load_struts(path, len(motions) - 1)
+    assert final.bending.sum() == pytest.approx(history[-1].bending)
 
 
 def test_interrupted_write_leaves_no_file(tmp_path, foam, options):

@@ -75,6 +75,59 @@ if HAS_TRUTH:
         script:
             "../scripts/analysis/truth_error.py"
 
+    rule difficulty:
+        input:
+            mesh=f"{R}/geometry/micro.vtu",
+            meso=expand(f"{R}/geometry/{{mesh}}.vtu", mesh=MESO),
+            reference=f"{R}/volumes/smooth0.h5",
+            deformed=expand(f"{R}/volumes/smooth{{state}}.h5", state=STATES),
+            truth=TRUTH,
+        output:
+            f"{R}/analysis/difficulty.json",
+        log:
+            f"{R}/logs/difficulty/all.log",
+        benchmark:
+            f"{R}/benchmarks/difficulty/all.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2500, 20.0),
+            runtime=60,
+        params:
+            code=code("analysis/difficulty.py"),
+            meso=MESO,
+            states=STATES,
+        script:
+            "../scripts/analysis/difficulty.py"
+
+
+if KIND == "twin":
+
+    rule twin_check:
+        input:
+            scans=[scan_path(state) for state in [0, *STATES]],
+            truth=TRUTH,
+            threshold=f"{R}/geometry/threshold.json",
+            cell_size=f"{R}/geometry/cell_size.json",
+        output:
+            f"{R}/analysis/twin_check.json",
+        log:
+            f"{R}/logs/twin_check/all.log",
+        benchmark:
+            f"{R}/benchmarks/twin_check/all.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 25.0),
+            runtime=60,
+        params:
+            code=code("analysis/twin_check.py"),
+            twin=TWIN_SCANS,
+        script:
+            "../scripts/analysis/twin_check.py"
+
 
 rule summary:
     input:

@@ -50,11 +50,16 @@ STATES = list(LABELS)
 MESO = settings.meso_names(config)
 FINEST = MESO[-1]
 MICRO = list(settings.micro_names(config))
-TRUTH = {
-    "twin": f"{R}/truth/twin.h5",
-    "virtual": f"{R}/truth/virtual.json",
-    "scans": settings.truth_file(config),
-}[KIND]
+TRUTH = settings.truth_file(config) if KIND == "scans" else None
+if KIND == "virtual":
+    TRUTH = f"{R}/truth/virtual.json"
+    SCANS = f"{R}/scans"
+if KIND == "twin":  # kept by its options, so that cases share it
+    TWIN_MOTION, TWIN_SCANS = settings.twin_parts(config)
+    MOTION_FOLDER = settings.twin_folder(TWIN_MOTION)
+    TRUTH = f"{MOTION_FOLDER}/motion.h5"
+    NETWORKS = expand(f"{MOTION_FOLDER}/network_state{{state}}.vtu", state=[0, *STATES])
+    SCANS = f"{settings.twin_folder(TWIN_SCANS)}/scans"
 HAS_TRUTH = TRUTH is not None
 ENV = "../../envs/addvc.yaml"
 
@@ -92,7 +97,7 @@ def own_scan(state):
 def scan_path(state):
     """The path of a scan as the configuration has it: a file, a folder or a pattern."""
     if own_scan(state):
-        return f"{R}/scans/state{state}.tif"
+        return f"{SCANS}/state{state}.tif"
     return [config["scans"]["reference"], *config["scans"]["states"]][state]
 
 

@@ -467,3 +467,135 @@ if STATES and HAS_TRUTH:
             case=FIGURE_CASE,
         script:
             "../scripts/figures/more_error.py"
+
+    rule more_difficulty:
+        input:
+            f"{R}/analysis/difficulty.json",
+        output:
+            shown(
+                "more_difficulty.csv",
+                "more_difficulty",
+                "Tables",
+                "how hard the test is",
+            ),
+        log:
+            f"{R}/logs/figures/more_difficulty.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_difficulty.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=5,
+        params:
+            code=code("figures/more_difficulty.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_difficulty.py"
+
+
+if STATES and KIND == "twin":
+
+    rule more_twin_check:
+        input:
+            f"{R}/analysis/twin_check.json",
+        output:
+            shown(
+                "more_twin_check.csv",
+                "more_twin_check",
+                "Tables",
+                "checks of the twin",
+            ),
+        log:
+            f"{R}/logs/figures/more_twin_check.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_twin_check.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=5,
+        params:
+            code=code("figures/more_twin_check.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_twin_check.py"
+
+    rule more_twin_scans:
+        input:
+            SPECIMEN,
+            expand(f"{R}/volumes/volume{{state}}.h5", state=[0, *STATES]),
+        output:
+            shown("more_twin_scans.png", "more_twin_scans", "Synthetic test", "scans"),
+        log:
+            f"{R}/logs/figures/more_twin_scans.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_twin_scans.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1000, 3.0),
+            runtime=10,
+        params:
+            code=code("figures/more_twin_scans.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_twin_scans.py"
+
+    rule more_twin_network:
+        input:
+            smooth(0),
+            networks=NETWORKS,
+        output:
+            shown(
+                "more_twin_network.png",
+                "more_twin_network",
+                "Synthetic test",
+                "network of beams",
+            ),
+        log:
+            f"{R}/logs/figures/more_twin_network.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_twin_network.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 20.0),
+            runtime=15,
+        params:
+            code=code("figures/more_twin_network.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_twin_network.py"
+
+    rule more_twin_mechanics:
+        input:
+            SPECIMEN,
+            history=f"{MOTION_FOLDER}/history.csv",
+        output:
+            shown(
+                "more_twin_mechanics.png",
+                "more_twin_mechanics",
+                "Synthetic test",
+                "mechanics",
+            ),
+            drawing("more_twin_mechanics"),
+        log:
+            f"{R}/logs/figures/more_twin_mechanics.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_twin_mechanics.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=10,
+        params:
+            code=code("figures/more_twin_mechanics.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_twin_mechanics.py"

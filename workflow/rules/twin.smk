@@ -1,11 +1,10 @@
 # Where images come from when they are not the user's: the twin, or virtual states of a real scan.
 
 if KIND == "twin":
-    TWIN = config["twin"] | {"porosity": config["porosity"]}
 
     rule twin_foam:
         output:
-            f"{R}/twin/foam.h5",
+            f"{MOTION_FOLDER}/foam.h5",
         log:
             f"{R}/logs/twin_foam/all.log",
         benchmark:
@@ -18,15 +17,17 @@ if KIND == "twin":
             runtime=20,
         params:
             code=code("twin/twin_foam.py"),
-            twin=TWIN,
+            twin=TWIN_MOTION,
         script:
             "../scripts/twin/twin_foam.py"
 
     rule twin_mechanics:
         input:
-            f"{R}/twin/foam.h5",
+            f"{MOTION_FOLDER}/foam.h5",
         output:
-            f"{R}/truth/twin.h5",
+            motion=TRUTH,
+            history=f"{MOTION_FOLDER}/history.csv",
+            networks=NETWORKS,
         log:
             f"{R}/logs/twin_mechanics/all.log",
         benchmark:
@@ -36,19 +37,19 @@ if KIND == "twin":
         threads: 1
         resources:
             mem_mb=memory(1500, 3.0),
-            runtime=60,
+            runtime=240,
         params:
             code=code("twin/twin_mechanics.py"),
-            twin=TWIN,
+            twin=TWIN_MOTION,
         script:
             "../scripts/twin/twin_mechanics.py"
 
     rule twin_scan:
         input:
-            foam=f"{R}/twin/foam.h5",
-            motion=f"{R}/truth/twin.h5",
+            foam=f"{MOTION_FOLDER}/foam.h5",
+            motion=TRUTH,
         output:
-            f"{R}/scans/state{{state}}.tif",
+            f"{SCANS}/state{{state}}.tif",
         log:
             f"{R}/logs/twin_scan/state{{state}}.log",
         benchmark:
@@ -61,7 +62,7 @@ if KIND == "twin":
             runtime=30,
         params:
             code=code("twin/twin_scan.py"),
-            twin=TWIN,
+            twin=TWIN_SCANS,
         script:
             "../scripts/twin/twin_scan.py"
 
@@ -93,7 +94,7 @@ if KIND == "virtual":
             field=f"{R}/truth/virtual.json",
             files=SCAN_FILES[0],
         output:
-            f"{R}/scans/state{{state}}.tif",
+            f"{SCANS}/state{{state}}.tif",
         log:
             f"{R}/logs/virtual_scan/state{{state}}.log",
         benchmark:

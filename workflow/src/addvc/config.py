@@ -2,6 +2,8 @@
 
 import difflib
 import glob
+import hashlib
+import json
 from pathlib import Path
 
 from jsonschema import Draft202012Validator
@@ -13,6 +15,16 @@ AXES = {"x": 0, "y": 1, "z": 2}
 NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
 NOMINAL_CELL = 28.0
 TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
+IMAGING = (  # keys of `twin` that change its scans, but neither foam nor motion
+    "bin",
+    "noise",
+    "dtype",
+    "psf",
+    "partial_volume",
+    "cupping",
+    "rings",
+    "drift",
+)
 
 
 def loading_axis(config: dict) -> int:
@@ -44,6 +56,21 @@ def case_kind(config: dict) -> str:
             raise ConfigError("`virtual` makes the deformed states: leave out scans.states")
         return "virtual"
     return "scans"
+
+
+def twin_parts(config: dict) -> tuple[dict, dict]:
+    """Options of the twin: those of its foam and motion, and all of them."""
+    whole = config["twin"] | {"porosity": config["porosity"]}
+    return {key: value for key, value in whole.items() if key not in IMAGING}, whole
+
+
+def twin_folder(options: dict) -> str:
+    """Where a twin is kept: by its options, so that cases that differ in how they measure share it.
+
+    The name begins with a dot, as no case may."""
+    text = json.dumps(options, sort_keys=True)
+    key = hashlib.sha256(text.encode()).hexdigest()[:10]
+    return f"results/.twins/{options['size']}-{options['seed']}-{key}"
 
 
 def check_given(config: dict) -> list[str]:

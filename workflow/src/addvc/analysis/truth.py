@@ -8,10 +8,10 @@ from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth
 from addvc.twin.truth import Truth
 from addvc.twin.virtual import VirtualField
 
-AnyTruth = Truth | MeshTruth | VirtualField
+Judge = Truth | MeshTruth | VirtualField
 
 
-def load_truth(path: str | Path) -> AnyTruth:
+def load_truth(path: str | Path) -> Judge:
     """The truth of the twin (.h5), of a virtual test (.json) or of the user's own mesh (.h5)."""
     if Path(path).suffix == ".json":
         return VirtualField.load(path)
@@ -41,7 +41,7 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     }
 
 
-def error_at(truth: AnyTruth, points: np.ndarray, u: np.ndarray, state: int) -> dict:
+def error_at(truth: Judge, points: np.ndarray, u: np.ndarray, state: int) -> dict:
     """Error statistics of u (n, 3) measured at points (n, 3) of the reference."""
     tangent = None if isinstance(truth, VirtualField) else truth.strut(points)[1]
     return error_statistics(u - truth.displacement(points, state), tangent)

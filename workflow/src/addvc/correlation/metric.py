@@ -36,9 +36,15 @@ def residual(
     """Eq. 5: r = I_r(x) - I_d(x + u(x)) (Q,) and inside (Q,); r = 0 where x is not
     in I_r or x + u has left I_d."""
     quadrature = reference.quadrature
-    moved = interpolate(reference.mesh.cells, quadrature.cell, quadrature.shape, u)
-    moved += quadrature.points
-    grey, inside = spline_value(deformed, moved)
+    at_points = interpolate(reference.mesh.cells, quadrature.cell, quadrature.shape, u)
+    return residual_at(reference, deformed, at_points)
+
+
+def residual_at(
+    reference: Reference, deformed: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for displacements u (Q, 3) given at the points themselves."""
+    grey, inside = spline_value(deformed, reference.quadrature.points + u)
     inside &= reference.inside
     return np.where(inside, reference.grey - grey, np.float32(0)), inside
 

@@ -8,7 +8,7 @@ import numpy as np
 from addvc.fem.mesh import Mesh
 from addvc.images.files import atomic_path
 
-KINDS = {3: "triangle", 4: "tetra", 8: "hexahedron"}
+KINDS = {2: "line", 3: "triangle", 4: "tetra", 8: "hexahedron"}
 
 
 def write_vtu(
@@ -18,7 +18,7 @@ def write_vtu(
     point_data: dict | None = None,
     cell_data: dict | None = None,
 ) -> None:
-    """Points (n, 3), cells (m, 3 | 4 | 8), fields by name: (n, ...) on points, (m, ...) on cells."""
+    """Points (n, 3), cells (m, 2 | 3 | 4 | 8), fields by name: (n, ...) on points, (m, ...) on cells."""
     kind = KINDS[cells.shape[1]]
     grid = meshio.Mesh(
         np.asarray(points),

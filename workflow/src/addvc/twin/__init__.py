@@ -5,33 +5,43 @@ image, axes x, y, z; compression is along y; I_reference(x) = I_state(x + u(x)).
 
 - `TwinOptions.from_config(dict)`; `SIZES`: shape of the binned image of each size.
 - `make_foam(options) -> Network`: beams of the reference.
-- `deform(network, options) -> [Motion]`: positions and rotations of the beam nodes, reference
-  first. The seam: mechanics of any kind may take its place.
+- `compress(network, options) -> [Motion], [LoadStep]`: positions and rotations of the beam nodes in
+  equilibrium, reference first. `Motion` is the seam: mechanics of any kind may take its place.
 - `image(network, motion, options, state) -> (bin nx, bin ny, bin nz)`; `write_scan(path, volume)`.
-- `save_foam`, `load_foam`; `save_motions(path, network, motions, options)`, `load_motions`.
+- `save_foam`, `load_foam`; `save_motions(path, network, motions, options, history)`, `load_motions`;
+  `write_network`, `write_history` for others to read.
 - `Truth.load(path)`: `displacement(points, state)`, `strut(points)`, `junctions`, `platens`,
   `strains`. `junctions(network) -> (n, 3)`.
 """
 
 from __future__ import annotations
 
+from .compression import LoadStep, compress
 from .foam import make_skeleton
-from .frame import Motion, deform
 from .imaging import image, write_scan
+from .motion import Motion
 from .options import SIZES, Specimen, TwinOptions, specimen
 from .raster import fit_radius, solid_fraction
-from .store import load_foam, load_motions, save_foam, save_motions
+from .store import (
+    load_foam,
+    load_motions,
+    save_foam,
+    save_motions,
+    write_history,
+    write_network,
+)
 from .struts import Network, junctions, subdivide
 from .truth import Truth
 
 __all__ = [
     "SIZES",
+    "LoadStep",
     "Motion",
     "Network",
     "Specimen",
     "Truth",
     "TwinOptions",
-    "deform",
+    "compress",
     "image",
     "junctions",
     "load_foam",
@@ -41,6 +51,8 @@ __all__ = [
     "save_motions",
     "solid_fraction",
     "specimen",
+    "write_history",
+    "write_network",
     "write_scan",
 ]
 

@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from . import kernels
-from .frame import Motion
 from .kernels import Beams, Bent, Cells
+from .motion import Motion
 from .struts import Network
 
 CELL = 2.5

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from addvc.images.files import atomic_path
 
-from .frame import Motion
+from .motion import Motion
 from .options import TwinOptions
 from .raster import SUPERSAMPLING, Rasteriser, slabs
 from .struts import Network
@@ -108,7 +108,10 @@ def image(network: Network, motion: Motion, options: TwinOptions, state: int) ->
     halo = int(TRUNCATE * options.psf + 0.5)
     plane = shape[1] * shape[2] * SUPERSAMPLING**3
     for start, stop, lo, hi in slabs(shape[0], plane, halo):
-        grey = grey_levels(raster.occupancy(lo, hi), platen)
+        solid = raster.occupancy(lo, hi)
+        if not options.partial_volume:
+            solid = (solid > 0.5).astype(np.float32)
+        grey = grey_levels(solid, platen)
         grey = gaussian_filter(grey, options.psf, mode="nearest", truncate=TRUNCATE)
         grey = grey[start - lo : stop - lo] * np.float32(brightness(options, state))
         radius = radius_map(np.arange(start, stop), shape)

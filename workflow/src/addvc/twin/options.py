@@ -19,11 +19,12 @@ SIZES = {
 """Shape (nx, ny, nz) of the binned image of each size, voxels."""
 
 DTYPES = ("uint8", "uint16", "float32")
+MATERIALS = ("elastic", "hinging")
 
 PLATEN_SHARE = 0.085
 """Share of the image's height that each platen fills in the reference."""
 
-AIR, AIR_SHARE = 7.0, 0.035
+AIR, AIR_SHARE = 9.0, 0.035
 """Air between the specimen and the side of the image: so many voxels for the free ends that swing
 out, and this share of the width for the specimen's bulge."""
 
@@ -32,28 +33,42 @@ out, and this share of the width for the specimen's bulge."""
 class TwinOptions:
     """Lengths are voxels of the binned image, grey levels those of an 8-bit scan.
 
-    `bin`: scans are made this many times finer than the binned image. `strains`: nominal
-    compression of each deformed state. `noise`: standard deviation per scan voxel. `psf`: Gaussian
-    sigma in scan voxels. `cupping`, `drift`: relative; `rings`: grey levels. Zero switches off.
-    `dtype`: `uint8` and `float32` hold grey levels, `uint16` 100 times them. `step`: strain
-    between two updates of the network's geometry.
+    Geometry: `elongation` of the cells along y, initial `bow` of the struts over their length,
+    `scatter` of the radius between struts and `roughness` along one, a `band` through the middle
+    whose struts are thinner by `weakening` and that is tilted by `tilt` degrees.
+    Mechanics: `strains`, the nominal compression of each state; `step`, the largest strain between
+    two equilibria; `material`, elastic or hinging: then the bending moment saturates where the
+    strain at the surface of a strut passes `hinge_strain`, with a slope of `hardening`.
+    Imaging: scans are `bin` times finer than the binned image. `noise`: standard deviation per scan
+    voxel. `psf`: Gaussian sigma in scan voxels. `cupping`, `drift`: relative; `rings`: grey levels.
+    Zero switches off, as does `partial_volume` (voxels then are solid or void). `dtype`: `uint8` and
+    `float32` hold grey levels, `uint16` 100 times them.
     """
 
     size: str = "default"
     seed: int = 2417
-    bin: int = 1
     cell_size: float = 28.0
     porosity: float = 0.96
+    elongation: float = 1.2
+    bow: float = 0.03
+    scatter: float = 0.12
+    roughness: float = 0.05
+    band: bool = True
+    weakening: float = 0.12
+    tilt: float = 20.0
     strains: tuple[float, ...] = (0.034, 0.052, 0.123, 0.285)
+    step: float = 0.01
+    material: str = "elastic"
+    hinge_strain: float = 0.02
+    hardening: float = 0.03
+    bin: int = 1
     noise: float = 4.0
     dtype: str = "uint8"
-    elongation: float = 1.2
-    band: bool = True
     psf: float = 0.7
+    partial_volume: bool = True
     cupping: float = 0.04
     rings: float = 1.0
     drift: float = 0.01
-    step: float = 0.01
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "strains", tuple(float(e) for e in self.strains))
@@ -90,7 +105,20 @@ class TwinOptions:
             f"strains {self.strains} must increase from above 0 to at most 0.5",
         )
         yield not 0 < self.step <= 0.05, f"step {self.step} is outside (0, 0.05]; 0.01 is usual"
-        for key in ("noise", "psf", "cupping", "rings", "drift"):
+        yield self.material not in MATERIALS, f"material {self.material!r} is none of {MATERIALS}"
+        yield (
+            not 0 < self.hinge_strain <= 1,
+            f"hinge_strain {self.hinge_strain} is outside (0, 1]; 0.02 is usual",
+        )
+        yield (
+            not 0.01 <= self.hardening <= 1,
+            f"hardening {self.hardening} is outside [0.01, 1]; 0.03 is usual, 1 is elastic",
+        )
+        yield (
+            not 0 <= self.weakening < 0.5,
+            f"weakening {self.weakening} is outside [0, 0.5): the band would not be meshed",
+        )
+        for key in ("bow", "scatter", "roughness", "noise", "psf", "cupping", "rings", "drift"):
             value = getattr(self, key)
             yield value < 0, f"{key} {value} is negative; 0 switches it off"
         size = min(SIZES.get(self.size, (1, 1, 1)))

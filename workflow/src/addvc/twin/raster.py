@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from . import kernels
-from .frame import Motion, at_rest
 from .geometry import beams, bend, bounds, cell_list
+from .motion import Motion, at_rest
 from .struts import Network, thicken
 
 SUPERSAMPLING = 2

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, fields
 
 import h5py
 import numpy as np
 
+from addvc.fem.io import write_vtu
 from addvc.images.files import atomic_path
 
-from .frame import Motion
+from .compression import LoadStep
+from .motion import Motion
 from .options import Specimen, TwinOptions
+from .structure import structure
+from .strut_state import StrutStates, strut_states
 from .struts import Network
 
 ARRAYS = ("nodes", "elements", "strut", "radii", "director", "kind")
@@ -59,15 +64,25 @@ def load_foam(path: str | os.PathLike) -> Network:
 
 
 def save_motions(
-    path: str | os.PathLike, network: Network, motions: list[Motion], options: TwinOptions
+    path: str | os.PathLike,
+    network: Network,
+    motions: list[Motion],
+    options: TwinOptions,
+    history: Sequence[LoadStep] = (),
 ) -> None:
-    """Write all that the truth needs: network, motion of each state, nominal strains, options."""
+    """Write all that the truth needs: network, motion of each state and what its struts undergo,
+    nominal strains, options; and the load steps that led there."""
+    held = structure(network, options)
     with _atomic(path) as file:
         _write_foam(file.create_group("foam"), network)
         for state, motion in enumerate(motions):
             group = file.create_group(f"state{state}")
             group["positions"], group["rotations"] = motion.positions, motion.rotations
             group.attrs["platens"] = motion.platens
+            for name, values in strut_states(held, network.strut, motion)._asdict().items():
+                group[f"struts/{name}"] = values
+        for name in (field.name for field in fields(LoadStep)):
+            file[f"history/{name}"] = np.array([getattr(step, name) for step in history])
         file.attrs["strains"] = np.array([0.0, *options.strains])
         file.attrs["options"] = json.dumps(asdict(options))
 
@@ -76,6 +91,47 @@ def load_motions(path: str | os.PathLike) -> list[Motion]:
     """Motions of all states, the reference first."""
     with h5py.File(path) as file:
         return [_read_motion(file[f"state{s}"]) for s in range(len(file.attrs["strains"]))]
+
+
+def write_network(
+    path: str | os.PathLike, network: Network, motion: Motion, options: TwinOptions
+) -> None:
+    """The beams of one state as lines in a VTU file: displacement, radius, and the energies and
+    strains of the strut that each belongs to."""
+    states = strut_states(structure(network, options), network.strut, motion)
+    cells = {name: values[network.strut] for name, values in states._asdict().items()}
+    cells |= {"radius": network.radii.mean(axis=1), "strut": network.strut}
+    cells["strut_length"] = strut_lengths(network)[network.strut]
+    moved = {"displacement": motion.positions - network.nodes}
+    write_vtu(path, network.nodes, network.elements, moved, cells)
+
+
+def strut_lengths(network: Network) -> np.ndarray:
+    """(struts,) lengths along the struts of the reference."""
+    chord = np.diff(network.nodes[network.elements], axis=1)[:, 0]
+    return np.bincount(network.strut, np.linalg.norm(chord, axis=1))
+
+
+def write_history(path: str | os.PathLike, history: Sequence[LoadStep]) -> None:
+    """The load steps as CSV, a row a step."""
+    names = [field.name for field in fields(LoadStep)]
+    with atomic_path(path) as temporary, temporary.open("w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(names)
+        table.writerows([getattr(step, name) for name in names] for step in history)
+
+
+def load_struts(path: str | os.PathLike, state: int) -> StrutStates:
+    """What the struts undergo in a state."""
+    with h5py.File(path) as file:
+        group = file[f"state{state}/struts"]
+        return StrutStates(*(group[name][:] for name in StrutStates._fields))
+
+
+def load_history(path: str | os.PathLike) -> dict[str, np.ndarray]:
+    """The load steps: an array (steps,) for each field of `LoadStep`."""
+    with h5py.File(path) as file:
+        return {name: values[:] for name, values in file["history"].items()}
 
 
 def load_strains(path: str | os.PathLike) -> tuple[float, ...]:

@@ -12,12 +12,6 @@ from .options import Specimen, TwinOptions, specimen
 ELEMENT = 2.6
 """Target length of a beam element, voxels."""
 
-BOW, SCATTER, ROUGHNESS = 0.03, 0.12, 0.05
-"""Initial bow over the length; deviations of the radius between struts and along one."""
-
-WEAKENING, TILT = 0.12, np.deg2rad(20.0)
-"""Of the weak band: share by which struts are thinner, and its tilt from the plane x, z."""
-
 
 @dataclass(frozen=True)
 class Network:
@@ -43,20 +37,22 @@ def area_profile(xi: np.ndarray) -> np.ndarray:
     return 1 + 2 * xi**2 + 12 * xi**4
 
 
-def roughness(s: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Smooth random factor of the radius at arc lengths s (n,): three waves of 5 to 12 voxels."""
+def roughness(s: np.ndarray, size: float, rng: np.random.Generator) -> np.ndarray:
+    """Smooth random factor of the radius at arc lengths s (n,), deviation `size`: three waves of 5
+    to 12 voxels."""
     length = rng.uniform(5, 12, 3)
     phase = rng.uniform(0, 2 * np.pi, 3)
     waves = np.sin(2 * np.pi * s[:, None] / length + phase)
-    return 1 + ROUGHNESS * np.sqrt(2 / 3) * waves.sum(axis=1)
+    return 1 + size * np.sqrt(2 / 3) * waves.sum(axis=1)
 
 
-def weak_band(points: np.ndarray, body: Specimen) -> np.ndarray:
+def weak_band(points: np.ndarray, body: Specimen, options: TwinOptions) -> np.ndarray:
     """Factor of the radius at points (n, 3): a tilted band through the middle is thinner."""
-    normal = np.array([np.sin(TILT), np.cos(TILT), 0.0])
+    tilt = np.deg2rad(options.tilt)
+    normal = np.array([np.sin(tilt), np.cos(tilt), 0.0])
     sigma = min(14.0, 0.12 * body.height)
     distance = (points - body.centre) @ normal
-    return 1 - WEAKENING * np.exp(-0.5 * (distance / sigma) ** 2)
+    return 1 - options.weakening * np.exp(-0.5 * (distance / sigma) ** 2)
 
 
 def across(axis: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -67,7 +63,7 @@ def across(axis: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def strut_beams(
-    a: np.ndarray, b: np.ndarray, whole: bool, rng: np.random.Generator
+    a: np.ndarray, b: np.ndarray, whole: bool, options: TwinOptions, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """One strut from a to b (3,) -> points (k + 1, 3), relative radii (k + 1,), lobe (3,).
 
@@ -76,13 +72,13 @@ def strut_beams(
     length = np.linalg.norm(b - a)
     axis = (b - a) / length
     share = np.linspace(0, 1, max(2, round(length / ELEMENT)) + 1)
-    bow = BOW * abs(rng.standard_normal()) * length
+    bow = options.bow * abs(rng.standard_normal()) * length
     points = a + share[:, None] * (b - a)
     points += bow * np.sin(np.pi * share)[:, None] * across(axis, rng)
     points[-1] = b
     xi = (share - 0.5) if whole else 0.5 * (share - 1)
-    scatter = 1 + SCATTER * np.clip(rng.standard_normal(), -2.5, 2.5)
-    radii = scatter * np.sqrt(area_profile(xi)) * roughness(share * length, rng)
+    scatter = 1 + options.scatter * np.clip(rng.standard_normal(), -2.5, 2.5)
+    radii = scatter * np.sqrt(area_profile(xi)) * roughness(share * length, options.roughness, rng)
     return points, radii, across(axis, rng)
 
 
@@ -111,13 +107,14 @@ def subdivide(skeleton: Skeleton, options: TwinOptions) -> Network:
     whole = skeleton.kind[edges[:, 1]] == JUNCTION
     ends = skeleton.nodes[edges]
     points, radii, lobes = zip(
-        *(strut_beams(a, b, w, rng) for (a, b), w in zip(ends, whole, strict=True)), strict=True
+        *(strut_beams(a, b, w, options, rng) for (a, b), w in zip(ends, whole, strict=True)),
+        strict=True,
     )
     inner = [len(p) - 2 for p in points]
     number = chains(Skeleton(skeleton.nodes, skeleton.kind, edges), inner)
     body = specimen(options)
     if options.band:
-        radii = [r * weak_band(p, body) for r, p in zip(radii, points, strict=True)]
+        radii = [r * weak_band(p, body, options) for r, p in zip(radii, points, strict=True)]
     return Network(
         np.concatenate([skeleton.nodes, *(p[1:-1] for p in points)]),
         np.concatenate([np.c_[c[:-1], c[1:]] for c in number]).astype(np.int32),

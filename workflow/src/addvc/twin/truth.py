@@ -13,11 +13,12 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from . import kernels
-from .frame import Motion
 from .geometry import REACH, beams, bend, cell_list, far_list
 from .kernels import Cells
+from .motion import Motion
 from .store import load_foam, load_motions, load_strains
 from .struts import Network, junctions
 
@@ -57,6 +58,12 @@ class Truth:
             self._bent[state] = bend(self.network, self.motions[state])
         b, p = self._beams, self._bent[state]
         return self._near(points, lambda cells, i, x: kernels.place(b, p, cells, i, x)) - points
+
+    def rotation_angles(self, state: int) -> np.ndarray:
+        """(m,) by how many degrees each beam has turned."""
+        ends = self.motions[state].rotations[self.network.elements]
+        angles = Rotation.from_matrix(ends.reshape(-1, 3, 3)).magnitude()
+        return np.degrees(angles.reshape(-1, 2).mean(axis=1))
 
     def strut(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nearest strut (n,), its unit tangent (n, 3) and the distance (n,) to its surface."""

@@ -1,0 +1,9 @@
+"""Beyond the paper, of the twin: stress, energies and convergence of its mechanics."""
+
+from addvc.report.case import Case
+from addvc.report.synthetic import mechanics
+from addvc.runtime import job
+
+with job(snakemake):
+    case = Case.of(snakemake.params.case, snakemake.input)
+    mechanics(case, snakemake.output, snakemake.input.history)
