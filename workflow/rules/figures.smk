@@ -548,7 +548,7 @@ if STATES and KIND == "twin":
     rule more_twin_network:
         input:
             smooth(0),
-            networks=NETWORKS,
+            networks=NETWORKS[1:],
         output:
             shown(
                 "more_twin_network.png",

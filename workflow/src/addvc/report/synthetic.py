@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm, Normalize
 from addvc.fem.io import read_vtu
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, View, aspect, oblique, render
+from addvc.report.scene import Layer, aspect, oblique, render
 from addvc.report.slices import show_slice
 
 ENERGIES = ("bending", "stretching", "shear", "torsion")
@@ -52,20 +52,24 @@ def _upright(volume: np.ndarray, axis: int, normal: int) -> tuple[np.ndarray, np
 
 
 def network(case: Case, outputs: Iterable[str], files: list[str]) -> None:
-    """The beams of each state, deformed, coloured by bending energy per length over its mean."""
+    """The beams of each loading state, deformed, coloured by bending energy per length over its
+    mean; files: a network a state."""
     bodies = [_tubes(path) for path in files]
-    norm = LogNorm(1 / SPAN, SPAN)
-    view = oblique(1)
+    norm, view = LogNorm(1 / SPAN, SPAN), oblique(1)
     fit = np.vstack([points for points, _, _ in bodies])
-    titles = ["reference", *(case.labels[n] for n in case.states)]
-    fig, axes = style.panels(1, len(bodies), aspect(view, fit), spare=10, bar=16)
-    for panel, (ax, title, body) in enumerate(zip(axes[0], titles, bodies, strict=True)):
-        layer = _coloured(*body, norm) if panel else Layer(*body[:2])
-        _show(ax, layer, view, fit, len(bodies))
-        style.headline(ax, title, panel)
-    style.scale_bar(axes[0, 0], case.voxel_um(), 0.5)
-    label = "bending energy per length / its mean (–)"
-    style.colour_bar(fig, axes, norm, "inferno", label, shrink=0.8)
+    columns = min(len(bodies), 2)
+    rows = -(-len(bodies) // columns)
+    fig, axes = style.panels(rows, columns, aspect(view, fit), spare=10, bar=14)
+    for ax in axes.flat[len(bodies) :]:
+        ax.set_axis_off()
+    for panel, (state, (points, faces, values)) in enumerate(zip(case.states, bodies, strict=True)):
+        layer = Layer(points, faces, values=values, norm=norm, cmap="inferno")
+        ax = axes.flat[panel]
+        render([layer], view, style.WIDTH / columns, fit, shadows=True).show(ax)
+        style.headline(ax, case.labels[state], panel)
+    style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
+    label = "bending energy per length of the strut, over its mean (–)"
+    style.colour_bar(fig, axes, norm, "inferno", label, shrink=0.6)
     style.save(fig, outputs)
 
 
@@ -86,14 +90,6 @@ def _tubes(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     tube = beams.tube(scalars="radius", absolute=True, n_sides=8).triangulate()
     faces = tube.regular_faces
     return np.asarray(tube.points), faces, np.asarray(tube["density"])[faces[:, 0]]
-
-
-def _coloured(points: np.ndarray, faces: np.ndarray, values: np.ndarray, norm: Normalize) -> Layer:
-    return Layer(points, faces, values=values, norm=norm, cmap="inferno")
-
-
-def _show(ax: Axes, layer: Layer, view: View, fit: np.ndarray, columns: int) -> None:
-    render([layer], view, style.WIDTH / columns, fit, shadows=True).show(ax)
 
 
 def mechanics(case: Case, outputs: Iterable[str], history: str) -> None:
