@@ -320,7 +320,9 @@ def test_scans_that_are_no_images(place):
 
 def test_a_porosity_that_no_threshold_gives(place, results):
     """The reference of the twin, with three quarters of its volume said to be solid."""
-    [scan] = (str(path.relative_to(place)) for path in place.glob("results/.twins/*/scans/state0.tif"))
+    [scan] = (
+        str(path.relative_to(place)) for path in place.glob("results/.twins/*/scans/state0.tif")
+    )
     scans = {"reference": scan, "states": [scan], "bin": 2, "axes": "zyx"}
     config = bad_case(place, "solid", scans=scans, porosity=0.25)
     done = snakemake(place, "results/solid/dvc/micro_factor.h5", config=config)
