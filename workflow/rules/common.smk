@@ -49,7 +49,8 @@ LABELS = settings.state_labels(config)
 STATES = list(LABELS)
 MESO = settings.meso_names(config)
 FINEST = MESO[-1]
-MICRO = list(settings.micro_names(config))
+METHODS = settings.micro_names(config)
+MICRO = list(METHODS)
 TRUTH = settings.truth_file(config) if KIND == "scans" else None
 if KIND == "virtual":
     TRUTH = f"{R}/truth/virtual.json"
@@ -134,3 +135,8 @@ def mesh_of(wildcards):
     """The mesh of a result: every micro method shares one."""
     name = wildcards.mesh if wildcards.mesh in MESO else "micro"
     return f"{R}/geometry/{name}.vtu"
+
+
+def method_of(wildcards):
+    """The method of a micro result."""
+    return METHODS[wildcards.micro]

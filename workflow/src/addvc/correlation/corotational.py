@@ -9,7 +9,7 @@ DVC a fold over stages.
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class Stage:
 
     rotated: bool = True
     scale: float | None = None
-    stop: Stop = Stop()
+    stop: Stop = field(default_factory=Stop)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 Every term is normalised on a shear wave v of period T (`shear_wave`), S(v) being its quadratic form
 v^T H v, so that a weight is (cut-off / T)**order: order 4 where an operator's norm is squared (Eq.
-10), order 2 where it is used once (Eq. 9, an elastic energy). Multiplied through by S(v), the functional reads
-S(u) + u^T M u, and it is M that these functions return.
+10), order 2 where it is used once (Eq. 9, an elastic energy). Multiplied through by S(v), the
+functional reads S(u) + u^T M u, and it is M that these functions return.
 
 In a foam ||D_K K v||^2 is dominated by the nodes of the free surface, so that it falls as T**-2
 rather than T**-4 below a period of some five cells: the cut-off then depends on T, which is why T

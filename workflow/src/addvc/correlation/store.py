@@ -68,6 +68,12 @@ def save_factor(
         file.attrs["weights"] = json.dumps(weights)
 
 
+def load_order(path: str | Path) -> tuple[np.ndarray, dict]:
+    """Order of elimination (3 n,), which serves every matrix of the same pattern, and weights."""
+    with h5py.File(path) as file:
+        return file["order"][:], json.loads(file.attrs["weights"])
+
+
 def load_factor(path: str | Path) -> tuple[Factor, sparse.csr_matrix, dict]:
     """What `save_factor` wrote."""
     with h5py.File(path) as file:

@@ -115,10 +115,13 @@ def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
 def _micro(case: Case, config: dict, method: str) -> dict[str, str]:
     """Functional, lengths and start of a micro method."""
     options = micro_options(config["micro"], case.cell_size, case.specimen.axis)
-    functional = "Eq. 10" if method == "eq10" else method
+    if method == "eq10":
+        functional, lengths = "Eq. 10", f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}"
+    else:
+        functional, lengths = method.replace("_", " "), f"l_E = {options.l_e:.3g}"
     return {
         "Matching functional": functional,
-        "Regularisation length (voxels)": f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}",
+        "Regularisation length (voxels)": lengths,
         "Initialisation": f"solution of {case.finest}",
     }
 
