@@ -41,10 +41,10 @@ def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
     sizes, the shortest that converged. On the twin, whose lattice mesh is finer, 1 / 1.4 / 2 cell
     sizes give median errors of .13 / .10 / .09 voxel at 3.4 %. Where a cell has many voxels
     (trabecular bone: 84) the noise, not the cell, asks for smoothing, and less of it: 20 / 56 / 168
-    voxels gave .06 / .10 / .22 voxel on a wavy field. "auto" of l_E: 0.8 cell size, at most half a
-    period."""
+    voxels gave .06 / .10 / .22 voxel on a wavy field. "auto" of l_E: 0.8 cell size, at most 0.7
+    periods."""
     longest = min(2 * cell_size, 1.6 * section["period"])
-    auto = {"l_k": longest, "l_l": longest, "l_e": min(0.8 * cell_size, section["period"] / 2)}
+    auto = {"l_k": longest, "l_l": longest, "l_e": min(0.8 * cell_size, 0.7 * section["period"])}
     lengths = {
         key: value if section[key] == "auto" else float(section[key]) for key, value in auto.items()
     }
@@ -95,7 +95,8 @@ def shell_of(method: str, shell: Quadrature) -> Quadrature | None:
 
 def stages(section: dict, levels: dict, method: str = "corotational") -> list[Stage]:
     """Stages of micro DVC from the `micro` section of a configuration and the grey `levels` of the
-    threshold (void, solid, noise); all but the last end at ten times the tolerance.
+    threshold (void, solid, noise); all but the last end at ten times the tolerance or after ten
+    iterations: their rotations are not the last ones.
 
     "auto" of `robust`: nine times the noise, at least a third of the contrast between void and
     solid. Half, once or twice as much changed the rms error by less than 0.003 voxel (twin, 3.4 and
@@ -105,6 +106,6 @@ def stages(section: dict, levels: dict, method: str = "corotational") -> list[St
         scale = max(9 * levels["noise"], (levels["solid"] - levels["void"]) / 3)
     scale = None if scale == "none" or method == "without_robust" else float(scale)
     last = Stop(section["tolerance"], section["max_iterations"])
-    early = Stop(10 * last.tolerance, last.max_iterations)
+    early = Stop(10 * last.tolerance, min(10, last.max_iterations))
     ends = [early] * (section["stages"] - 1) + [last]
     return [Stage(rotated, scale, end) for end in ends]
