@@ -157,6 +157,7 @@ rule summary:
         )
         if HAS_TRUTH
         else [],
+        **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",
     log:
