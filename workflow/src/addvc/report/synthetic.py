@@ -63,13 +63,13 @@ def network(case: Case, outputs: Iterable[str], files: list[str]) -> None:
     for ax in axes.flat[len(bodies) :]:
         ax.set_axis_off()
     for panel, (state, (points, faces, values)) in enumerate(zip(case.states, bodies, strict=True)):
-        layer = Layer(points, faces, values=values, norm=norm, cmap="inferno")
+        layer = Layer(points, faces, values=values, norm=norm, cmap="plasma")
         ax = axes.flat[panel]
         render([layer], view, style.WIDTH / columns, fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state], panel)
     style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
     label = "bending energy per length of the strut, over its mean (–)"
-    style.colour_bar(fig, axes, norm, "inferno", label, shrink=0.6)
+    style.colour_bar(fig, axes, norm, "plasma", label, shrink=0.6)
     style.save(fig, outputs)
 
 
