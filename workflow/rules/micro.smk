@@ -3,15 +3,15 @@
 
 rule transfer:
     input:
-        mesh=f"{R}/geometry/{{meso}}.vtu",
+        meshes=[mesh_of(name) for name in MESO],
         micro=f"{R}/geometry/micro.vtu",
-        solution=f"{R}/dvc/{{meso}}_state{{state}}.h5",
+        solutions=of_state("dvc/{mesh}_state{state}.h5", MESO),
     output:
-        f"{R}/dvc/{{meso}}_on_micro_state{{state}}.h5",
+        on_micro(MESO),
     log:
-        f"{R}/logs/transfer/{{meso}}_state{{state}}.log",
+        f"{R}/logs/transfer/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/transfer/{{meso}}_state{{state}}.tsv"
+        f"{R}/benchmarks/transfer/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
