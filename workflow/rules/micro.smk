@@ -79,6 +79,7 @@ rule micro_ultimate_error:
     input:
         mesh=f"{R}/geometry/micro.vtu",
         reference=f"{R}/volumes/smooth0.h5",
+        threshold=f"{R}/geometry/threshold.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
     output:
         f"{R}/analysis/ultimate_{{micro}}.json",
@@ -95,5 +96,6 @@ rule micro_ultimate_error:
     params:
         code=code("micro/ultimate_error.py"),
         ultimate_error=config["ultimate_error"],
+        images=section("images", "blur"),
     script:
         "../scripts/micro/ultimate_error.py"
