@@ -3,15 +3,15 @@
 
 rule transfer:
     input:
-        mesh=f"{R}/geometry/{{meso}}.vtu",
+        meshes=[mesh_of(name) for name in MESO],
         micro=f"{R}/geometry/micro.vtu",
-        solution=f"{R}/dvc/{{meso}}_state{{state}}.h5",
+        solutions=of_state("dvc/{mesh}_state{state}.h5", MESO),
     output:
-        f"{R}/dvc/{{meso}}_on_micro_state{{state}}.h5",
+        on_micro(MESO),
     log:
-        f"{R}/logs/transfer/{{meso}}_state{{state}}.log",
+        f"{R}/logs/transfer/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/transfer/{{meso}}_state{{state}}.tsv"
+        f"{R}/benchmarks/transfer/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -111,6 +111,7 @@ rule micro_ultimate_error:
         mesh=f"{R}/geometry/micro.vtu",
         shell=f"{R}/geometry/shell.h5",
         reference=f"{R}/volumes/smooth0.h5",
+        threshold=f"{R}/geometry/threshold.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
     output:
         f"{R}/analysis/ultimate_{{micro}}.json",
@@ -128,5 +129,6 @@ rule micro_ultimate_error:
         code=code("micro/ultimate_error.py"),
         method=method_of,
         ultimate_error=config["ultimate_error"],
+        images=section("images", "blur"),
     script:
         "../scripts/micro/ultimate_error.py"

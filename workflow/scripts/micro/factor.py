@@ -7,7 +7,7 @@ from addvc.fem.mesh import Mesh
 from addvc.fem.shell import load_quadrature
 from addvc.fem.solver import factorise
 from addvc.images.files import read_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:

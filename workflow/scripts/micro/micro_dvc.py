@@ -7,7 +7,7 @@ from addvc.correlation.store import load_factor, load_field, load_order, save_so
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake):

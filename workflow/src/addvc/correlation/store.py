@@ -1,15 +1,20 @@
 """Solutions and factors on disk (HDF5), so that jobs can hand them to each other."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 from scipy import sparse
 
 from addvc.correlation.gauss_newton import Solution
-from addvc.fem.solver import Factor
 from addvc.images.files import atomic_path
+
+if TYPE_CHECKING:
+    from addvc.fem.solver import Factor
 
 
 def save_solution(path: str | Path, solution: Solution, **notes) -> None:
@@ -76,6 +81,8 @@ def load_order(path: str | Path) -> tuple[np.ndarray, dict]:
 
 def load_factor(path: str | Path) -> tuple[Factor, sparse.csr_matrix, dict]:
     """What `save_factor` wrote."""
+    from addvc.fem.solver import Factor  # and with it numba, which most jobs that read do without
+
     with h5py.File(path) as file:
         parts = {
             name: (file[name]["data"][:], file[name]["indices"][:], file[name]["indptr"][:])

@@ -87,7 +87,9 @@ def _column(case: Case, name: str, config: dict, methods: dict[str, str]) -> dic
     image = case.json("input.json")["scans"][0]["binned_shape"]
     given = _micro(case, config, methods[name]) if micro else _meso(case, name, config)
     shared = {
-        "Ultimate error (voxels)": _ultimate(case, name),
+        "Ultimate error (voxels)": _ultimate(case, name, "ultimate_error"),
+        "The same with noise (voxels)": _ultimate(case, name, "with_noise"),
+        "Standard uncertainty a priori (voxels)": _ultimate(case, name, "a_priori"),
         "FE type": "4-node tetrahedron (Lagrange)",
         "Nodes": str(facts["nodes"]),
         "Elements": str(facts["cells"]),
@@ -126,8 +128,8 @@ def _micro(case: Case, config: dict, method: str) -> dict[str, str]:
     }
 
 
-def _ultimate(case: Case, name: str) -> str:
-    value = case.json(f"analysis/ultimate_{name}.json").get("ultimate_error")
+def _ultimate(case: Case, name: str, key: str) -> str:
+    value = case.json(f"analysis/ultimate_{name}.json").get(key)
     return "–" if value is None else f"{value:.2e}"
 
 
