@@ -81,8 +81,8 @@ def with_noise(system: System, coefficients: np.ndarray, noise: Noise, rows: lis
     white = a_priori_white(system, sigma)
     return {
         "with_noise": float(np.sqrt(np.mean([row["std"] ** 2 for row in rows]))),
-        "a_priori": rms(expected) / np.sqrt(3),
-        "a_priori_white": rms(white) / np.sqrt(3),
+        "a_priori": float(rms(expected) / np.sqrt(3)),
+        "a_priori_white": float(rms(white) / np.sqrt(3)),
         "noise": noise.std,
         "noise_at_points": sigma,
         "noisy_shifts": rows,

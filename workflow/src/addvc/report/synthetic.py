@@ -98,11 +98,11 @@ def mechanics(case: Case, outputs: Iterable[str], history: str) -> None:
         rows = list(csv.DictReader(file))
     table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     strain = 100 * table["strain"]
-    fig = style.figure(60)
+    fig = style.figure(64)
     stress, energy, cost = fig.subplots(1, 3)
     area = np.pi * case.specimen.radius**2
     stress.plot(np.r_[0, strain], np.r_[0, 1e4 * table["force_low"] / area], color=style.DARK)
-    stress.set(ylabel="nominal stress / E of the strut (10⁻⁴)")
+    stress.set(ylabel="nominal stress / E (10⁻⁴)")
     _shares(energy, strain, table)
     cost.semilogy(strain, table["steps"], "o-", ms=2.5, color=style.DARK)
     cost.set(ylabel="steps to equilibrium (–)")
@@ -127,4 +127,4 @@ def _shares(ax: Axes, strain: np.ndarray, table: dict[str, np.ndarray]) -> None:
     shares = [table[name] / total for name in ENERGIES]
     ax.stackplot(strain, shares, labels=ENERGIES, colors=style.SERIES[1:5], alpha=0.85)
     ax.set(ylabel="share of the elastic energy (–)", ylim=(0, 1))
-    ax.legend(loc="lower left", frameon=True, framealpha=0.85, edgecolor="none")
+    ax.legend(loc="lower left", frameon=True, framealpha=0.95, edgecolor="none")
