@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.skeleton import FREE_END, StrutGraph
 
-STATIONS = 25
+STATIONS = 17
 """Sections along a strut at which it is described."""
 
 SPACING = 0.25
