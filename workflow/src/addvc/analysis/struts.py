@@ -1,17 +1,15 @@
 """The micro mesh cut into struts and junctions, each strut a curved beam with measured sections.
 
 What is nearest to the skeleton of a strut is the strut's, but for its ends: as far as the largest
-ball that fits in a junction, the solid is the junction's. The centre line of a strut is a cubic through the
-centroids of its tetrahedra: what a displacement says of stretching depends on it, since an offset d
-of the line reads a curvature k as an axial strain k d.
+ball that fits in a junction, the solid is the junction's.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import polynomial
 from scipy.spatial import cKDTree
 
+from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.skeleton import FREE_END, StrutGraph
 
@@ -24,24 +22,23 @@ SPACING = 0.25
 LEAST = 24
 """Nodes of a strut, at least, for its motion to be fitted."""
 
-DEGREE = 3
-"""Of the centre line, a polynomial of the arc length."""
-
-PROJECTIONS = 4
-"""Rounds of fitting the centre line and finding where on it each centroid is."""
+NECK = 0.25
+"""A section that is smaller than this share of the mean says that the strut is broken there."""
 
 
 @dataclass(frozen=True, eq=False)
 class Strut:
     """A strut between its junctions: `points` (g, 3) of its centre line, equidistant sections of
     `area` (g,); its nodes (k,) in the micro mesh with their weights (k,) (volume) and places (k,) on
-    the line, 0 to g - 1; `ends`: its junctions, -1 for none; `span`: its length between the balls
-    that fit in the junctions. Voxels."""
+    the line, 0 to g - 1; `ends`: its junctions, -1 for none; `span`: the length of
+    the line, between the balls that fit in the junctions; `length`: from junction to junction.
+    Voxels."""
 
     ends: tuple[int, int]
     points: np.ndarray
     area: np.ndarray
     span: float
+    length: float
     nodes: np.ndarray
     weight: np.ndarray
     place: np.ndarray
@@ -50,6 +47,11 @@ class Strut:
     def whole(self) -> bool:
         """Whether both ends are junctions."""
         return FREE_END not in self.ends
+
+    @property
+    def broken(self) -> bool:
+        """Whether a section is so thin that the solid hardly holds together."""
+        return bool(self.area.min() < NECK * self.area.mean())
 
     @property
     def middle(self) -> np.ndarray:
@@ -68,21 +70,27 @@ class Strut:
         return chord / np.linalg.norm(chord)
 
 
-def partition(mesh: Mesh, graph: StrutGraph) -> list[Strut]:
-    """Struts of a micro mesh, those with enough solid between their junctions to be measured."""
+def partition(mesh: Mesh, graph: StrutGraph, excess: np.ndarray) -> list[Strut]:
+    """Struts of a micro mesh, those with enough solid between their junctions to be measured.
+
+    excess (nx, ny, nz): the grey level of the reference above that of the void."""
     volume, centre = np.abs(cell_volumes(mesh)), mesh.points[mesh.cells].mean(axis=1)
     weight = np.bincount(mesh.cells.ravel(), np.repeat(volume / 4, 4), len(mesh.points))
     lines = [resampled(branch.points, SPACING) for branch in graph.branches]
     cells, nodes = (nearest_line(lines, x) for x in (centre, mesh.points))
     struts = []
     for branch, line, own, held in zip(graph.branches, lines, cells, nodes, strict=True):
-        trims = [0.0 if end == FREE_END else graph.radii[end] for end in branch.ends]
-        bounds = measurable(line, volume[own].sum(), trims)
-        if bounds is None or len(held) < LEAST:
+        radius = np.sqrt(volume[own].sum() / (np.pi * branch.length))
+        trims = [radius if end == FREE_END else graph.radii[end] for end in branch.ends]
+        bounds = trims[0], arc_length(line)[-1] - trims[1]
+        if bounds[1] - bounds[0] < 2 * radius or min(len(own), len(held)) < LEAST:
             continue
-        solid = Samples(centre[own], volume[own], along(line, centre[own]))
-        skin = Samples(mesh.points[held], weight[held], along(line, mesh.points[held]))
-        struts.append(measured_strut(branch.ends, bounds, solid, skin, held))
+        solid, skin = (
+            Samples(n, x[n], w[n], along(line, x[n]))
+            for n, x, w in ((own, centre, volume), (held, mesh.points, weight))
+        )
+        curve = centre_line(line, bounds, radius, excess)
+        struts.append(measured_strut(branch.ends, trims, curve, solid, skin))
     return [strut for strut in struts if len(strut.nodes) >= LEAST]
 
 
@@ -103,107 +111,39 @@ def nearest_line(lines: list[np.ndarray], points: np.ndarray) -> list[np.ndarray
     return np.split(order, np.searchsorted(label[order], np.arange(1, len(lines))))
 
 
-def along(line: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Arc length (q,) of the point of a line (k, 3) that is nearest to each of the points (q, 3)."""
-    s = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
-    return s[cKDTree(line).query(points)[1]]
-
-
-def measurable(line: np.ndarray, volume: float, trims: list[float]) -> tuple[float, float] | None:
-    """Arc lengths (2,) between which a strut is free of its junctions (`trims` from the ends) or of
-    its loose end (by its radius); None where it is not as long as it is wide."""
-    length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
-    radius = np.sqrt(volume / (np.pi * max(length, 1e-9)))
-    low, high = (trim or radius for trim in trims)
-    return (low, length - high) if length - low - high > 2 * radius > 0 else None
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """Polynomials of the arc length, of x = (s - middle) / half: coefficients (d, 3)."""
-
-    middle: float
-    half: float
-    coefficients: np.ndarray
-
-    @classmethod
-    def fit(
-        cls, bounds: tuple[float, float], s: np.ndarray, points: np.ndarray, weight: np.ndarray
-    ) -> "Curve":
-        """By least squares of points (q, 3) at arc lengths (q,)."""
-        middle, half = sum(bounds) / 2, (bounds[1] - bounds[0]) / 2
-        x = (s - middle) / half
-        return cls(middle, half, polynomial.polyfit(x, points, DEGREE, w=np.sqrt(weight)))
-
-    def __call__(self, s: np.ndarray) -> np.ndarray:
-        """Points (q, 3); straight on beyond the ends."""
-        x = (s - self.middle) / self.half
-        inner = np.clip(x, -1, 1)
-        return self._value(self.coefficients, inner) + (x - inner)[:, None] * self._slope(inner)
-
-    def tangent(self, s: np.ndarray) -> np.ndarray:
-        """dx/ds (q, 3), of a length near one."""
-        return self._slope(np.clip((s - self.middle) / self.half, -1, 1)) / self.half
-
-    def _slope(self, x: np.ndarray) -> np.ndarray:
-        return self._value(polynomial.polyder(self.coefficients), x)
-
-    @staticmethod
-    def _value(coefficients: np.ndarray, x: np.ndarray) -> np.ndarray:
-        return polynomial.polyval(x, coefficients).T
-
-    def projected(self, points: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Arc lengths (q,) of points (q, 3) on the curve, from those given: Newton steps."""
-        for _ in range(3):
-            slope = self.tangent(s)
-            step = np.einsum("qi,qi->q", points - self(s), slope)
-            s = s + step / np.maximum(np.einsum("qi,qi->q", slope, slope), 1e-12)
-        return s
-
-
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Points (q, 3) of a strut with weights (q,) and arc lengths (q,)."""
+    """Points (q, 3) of the mesh with their numbers (q,), weights (q,) and places along a line (q,)."""
 
+    number: np.ndarray
     points: np.ndarray
     weight: np.ndarray
     s: np.ndarray
 
 
 def measured_strut(
-    ends: tuple[int, int],
-    bounds: tuple[float, float],
-    solid: Samples,
-    skin: Samples,
-    nodes: np.ndarray,
+    ends: tuple[int, int], trims: list[float], curve: Curve, solid: Samples, skin: Samples
 ) -> Strut:
-    """The beam that the centroids of tetrahedra (`solid`, weight: volume) describe between two arc
-    lengths, and where on it the nodes (`skin`) are."""
-    curve, s = centre_line(bounds, solid)
+    """The beam along a curve of which `trims` are left out at both ends, its sections from the
+    tetrahedra (`solid`, weights: volumes), and where on it the nodes (`skin`) are."""
+    bounds = curve.middle - curve.half, curve.middle + curve.half
     dense = np.linspace(*bounds, 8 * STATIONS)
-    arc = np.r_[0, np.cumsum(np.linalg.norm(np.diff(curve(dense), axis=0), axis=1))]
+    arc = arc_length(curve(dense))
     stations = np.interp(np.linspace(0, arc[-1], STATIONS), arc, dense)
+    s = curve.projected(solid.points, solid.s)
     radius = np.sqrt(solid.weight.sum() / np.ptp(s) / np.pi)
-    area = section_areas(stations, Samples(solid.points, solid.weight, s), radius / 2)
+    area = section_areas(stations, s, solid.weight, radius / 2)
     of_node = curve.projected(skin.points, skin.s)
     inside = (of_node >= bounds[0]) & (of_node <= bounds[1])
-    place = np.interp(np.interp(of_node, dense, arc), [0, arc[-1]], [0, STATIONS - 1])
-    return Strut(ends, curve(stations), area, float(arc[-1]), nodes[inside],
-                 skin.weight[inside], place[inside])  # fmt: skip
+    place = np.interp(of_node[inside], dense, arc / arc[-1] * (STATIONS - 1))
+    return Strut(ends, curve(stations), area, float(arc[-1]), float(arc[-1] + sum(trims)),
+                 skin.number[inside], skin.weight[inside], place)  # fmt: skip
 
 
-def centre_line(bounds: tuple[float, float], solid: Samples) -> tuple["Curve", np.ndarray]:
-    """A cubic of the arc length through the centroids between two arc lengths, by least squares
-    weighted with volume, and the arc lengths (q,) of all centroids on it."""
-    s = solid.s
-    for _ in range(PROJECTIONS):
-        use = (s >= bounds[0]) & (s <= bounds[1])
-        curve = Curve.fit(bounds, s[use], solid.points[use], solid.weight[use])
-        s = curve.projected(solid.points, s)
-    return curve, s
-
-
-def section_areas(stations: np.ndarray, solid: Samples, width: float) -> np.ndarray:
-    """Area (g,) of the sections at arc lengths (g,): volume per length, by a Gaussian window."""
-    window = np.exp(-0.5 * ((stations[:, None] - solid.s) / width) ** 2)
-    return window @ solid.weight / (np.sqrt(2 * np.pi) * width)
+def section_areas(
+    stations: np.ndarray, s: np.ndarray, volume: np.ndarray, width: float
+) -> np.ndarray:
+    """Area (g,) of the sections at arc lengths (g,): volumes (q,) at arc lengths (q,) per length, by
+    a Gaussian window."""
+    window = np.exp(-0.5 * ((stations[:, None] - s) / width) ** 2)
+    return window @ volume / (np.sqrt(2 * np.pi) * width)
