@@ -45,7 +45,9 @@ class Curve:
         """Points (q, 3); straight on beyond the ends."""
         x = (s - self.middle) / self.half
         inner = np.clip(x, -1, 1)
-        return polynomial.polyval(inner, self.coefficients).T + (x - inner)[:, None] * self._slope(x)
+        return polynomial.polyval(inner, self.coefficients).T + (x - inner)[:, None] * self._slope(
+            x
+        )
 
     def tangent(self, s: np.ndarray) -> np.ndarray:
         """dx/ds (q, 3), of a length near one."""

@@ -36,22 +36,21 @@ class StrutEnergy:
     @property
     def bending_share_std(self) -> float:
         """Standard deviation of the share of bending."""
-        return share_std(self.energies, self.covariance)
+        return self.share_std(0)
+
+    def share_std(self, kind: int) -> float:
+        """Standard deviation of the share of one of KINDS; nan where there is no energy."""
+        total = self.energies.sum()
+        if not total > 0:
+            return float("nan")
+        slope = np.eye(len(KINDS))[kind] / total - self.energies[kind] / total**2
+        return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
 
 
 def shares(energies: np.ndarray) -> np.ndarray:
     """(3,) of the sum of energies (3,); nan where there is none."""
     total = energies.sum()
     return energies / total if total > 0 else np.full(len(energies), np.nan)
-
-
-def share_std(energies: np.ndarray, covariance: np.ndarray) -> float:
-    """Standard deviation of the share of the first of energies (3,) with covariance (3, 3)."""
-    total = energies.sum()
-    if not total > 0:
-        return float("nan")
-    slope = -energies[0] / total**2 + np.eye(len(energies))[0] / total
-    return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
 
 
 def strut_energy(strut: Strut, fit: StrutMotion, nu: float) -> StrutEnergy:

@@ -138,9 +138,7 @@ class Places:
         return low + self.share * (high - low)
 
 
-def integrated(
-    beam: Beam, values: np.ndarray, position: np.ndarray, turn: np.ndarray
-) -> Motion:
+def integrated(beam: Beam, values: np.ndarray, position: np.ndarray, turn: np.ndarray) -> Motion:
     """The motion with coefficients (8,) whose middle station is at `position` (3,), turned by `turn`
     (3, 3): R_+ = R exp(h K), r_+ = r + R exp(h K / 2) (chord + h Gamma)."""
     curvature = np.tensordot(values[:CURVATURES], beam.shapes[:CURVATURES], 1)

@@ -131,9 +131,7 @@ def _branch(
     return [Branch(points, ends)] if ends != (FREE_END, FREE_END) else []
 
 
-def split_at_kinks(
-    branches: list[Branch], middles: np.ndarray
-) -> tuple[list[Branch], np.ndarray]:
+def split_at_kinks(branches: list[Branch], middles: np.ndarray) -> tuple[list[Branch], np.ndarray]:
     """Branches cut where they turn: a junction is there, of which the threshold has left two struts.
 
     Returns the pieces and the junctions (j, 3) with those found now."""
@@ -160,9 +158,7 @@ def kinks(points: np.ndarray) -> list[int]:
     return [int(k) for k in found[np.diff(found, prepend=-NEAR_END) >= NEAR_END]]
 
 
-def simplified(
-    count: int, branches: list[Branch], width: float
-) -> tuple[np.ndarray, list[Branch]]:
+def simplified(count: int, branches: list[Branch], width: float) -> tuple[np.ndarray, list[Branch]]:
     """Ends shorter than `width` pruned, junctions nearer than half of it merged, and branches that
     meet two by two joined, until nothing changes.
 
