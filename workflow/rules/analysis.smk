@@ -75,6 +75,32 @@ if HAS_TRUTH:
         script:
             "../scripts/analysis/truth_error.py"
 
+    rule struts_truth:
+        input:
+            struts=f"{R}/geometry/struts.h5",
+            mesh=f"{R}/geometry/micro.vtu",
+            table=f"{R}/struts_state{{state}}.csv",
+            truth=TRUTH,
+        output:
+            table=f"{R}/analysis/struts_truth_state{{state}}.csv",
+            figures=f"{R}/analysis/struts_truth_state{{state}}.json",
+        log:
+            f"{R}/logs/struts_truth/state{{state}}.log",
+        benchmark:
+            f"{R}/benchmarks/struts_truth/state{{state}}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 10.0),
+            runtime=60,
+        params:
+            code=code("analysis/struts_truth.py"),
+            nu=config["micro"]["nu"],
+            names=[MICRO[0], FINEST],
+        script:
+            "../scripts/analysis/struts_truth.py"
+
     rule difficulty:
         input:
             mesh=f"{R}/geometry/micro.vtu",
