@@ -20,6 +20,9 @@ from addvc.twin.truth import Truth
 OVERLAP = 0.9
 """Share of the centre line that must be in one beam for a strut to be that of the twin."""
 
+LOADED = 1e-3
+"""Energy per volume, over the mean, below which a strut carries no load and its share says nothing."""
+
 COMPARED = ("bending_share", "axial_strain")
 FIELD, BEAMS = "_field", "_beams"
 """Added to the names of the columns of both truths."""
@@ -45,6 +48,8 @@ def true_columns(
     rows = [mechanics(strut, points, u, nu) for strut in struts]
     names = (*KINDS, *COMPARED)
     columns = {name + FIELD: np.array([row[name] for row in rows]) for name in names}
+    volume = np.array([strut.span * strut.area.mean() for strut in struts])
+    columns[f"bending_share{FIELD}"][unloaded(columns, FIELD, volume)] = np.nan
     if not isinstance(truth, Truth):
         return columns
     number = matched(struts, truth)
@@ -56,7 +61,15 @@ def true_columns(
         values["bending"], total, out=np.full(len(total), np.nan), where=total > 0
     )
     columns |= {n + BEAMS: np.where(known, values[n][number], np.nan) for n in names}
+    columns[f"bending_share{BEAMS}"][unloaded(columns, BEAMS, volume)] = np.nan
     return columns | {"true_strut": number}
+
+
+def unloaded(columns: dict[str, np.ndarray], ending: str, volume: np.ndarray) -> np.ndarray:
+    """(n,) bool: struts of volumes (n,) with hardly any energy, as those that end in the open."""
+    energy = np.sum([columns[kind + ending] for kind in KINDS], axis=0)
+    known = np.isfinite(energy)
+    return known & (energy / volume < LOADED * energy[known].sum() / volume[known].sum())
 
 
 def judged(table: dict, true: dict, results: dict[str, str]) -> dict:

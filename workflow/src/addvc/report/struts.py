@@ -34,10 +34,13 @@ def network(case: Case, outputs: Iterable[str]) -> None:
         norm = Normalize(0, 1) if row == 0 else strain_range(table, sources.values())
         cmap = style.MAGNITUDE if row == 0 else style.SIGNED
         for panel, (name, suffix) in enumerate(sources.items()):
-            values = table[column + suffix][owner]
-            known = valid[owner] & np.isfinite(values)
-            layers = [Layer(points, faces[known], values=values[known], norm=norm, cmap=cmap)]
-            layers.append(Layer(points, faces[~known], colour="#d9d9d9", opacity=0.5))
+            values = np.where(valid, table[column + suffix], np.nan)[owner]
+            known = np.isfinite(values) & (owner != FREE_END)
+            layers = [
+                Layer(points, faces[known], values=values[known], norm=norm, cmap=cmap),
+                Layer(points, faces[~known & (owner != FREE_END)], colour="#e3e3e3", opacity=0.6),
+                Layer(points, faces[owner == FREE_END], colour="#9a9a9a"),
+            ]
             render(layers, view, style.WIDTH / 2, points, shadows=True).show(ax[panel])
             style.headline(ax[panel], f"{case.title(state, name)}, {name}", 2 * row + panel)
         label = "share of bending (–)" if row == 0 else "axial strain (–)"
@@ -55,21 +58,38 @@ def strain_range(table: dict[str, np.ndarray], suffixes: Iterable[str]) -> Norma
 
 
 def tubes(struts: list[Strut], junctions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Struts as tubes from junction to junction: points (n, 3), triangles (f, 3), strut (f,)."""
+    """Struts as tubes between balls: points (n, 3), triangles (f, 3), and the strut (f,) of each
+    triangle, -1 for the junctions."""
     import pyvista
 
-    parts = []
+    parts, size = [], np.zeros(len(junctions))
     for number, strut in enumerate(struts):
-        head, tail = (junctions[[e]] if e != FREE_END else np.zeros((0, 3)) for e in strut.ends)
-        line = pyvista.lines_from_points(np.vstack([head, strut.points, tail]))
-        tube = line.tube(radius=strut.radius, n_sides=10, capping=True).triangulate()
-        parts.append((np.asarray(tube.points), tube.regular_faces, number))
-    first = np.cumsum([0, *(len(points) for points, _, _ in parts)])
+        for end in strut.ends:
+            if end != FREE_END:
+                size[end] = max(size[end], strut.radius)
+        tube = pyvista.lines_from_points(extended(strut)).tube(
+            radius=strut.radius, n_sides=12, capping=True
+        )
+        parts.append((tube.triangulate(), number))
+    for junction, radius in zip(junctions, 1.15 * size, strict=True):
+        if radius > 0:
+            ball = pyvista.Sphere(radius, junction, theta_resolution=14, phi_resolution=14)
+            parts.append((ball.triangulate(), FREE_END))
+    first = np.cumsum([0, *(part.n_points for part, _ in parts)])
     return (
-        np.vstack([points for points, _, _ in parts]),
-        np.vstack([faces + start for (_, faces, _), start in zip(parts, first, strict=False)]),
-        np.concatenate([np.full(len(faces), number) for _, faces, number in parts]),
+        np.vstack([part.points for part, _ in parts]),
+        np.vstack([p.regular_faces + n for (p, _), n in zip(parts, first, strict=False)]),
+        np.concatenate([np.full(part.n_cells, number) for part, number in parts]),
     )
+
+
+def extended(strut: Strut) -> np.ndarray:
+    """The centre line (g + 2, 3), straight on to its junctions."""
+    line = strut.points
+    ahead = (strut.length - strut.span) / 2
+    ends = line[[0, -1]] - line[[1, -2]]
+    ends *= ahead / np.linalg.norm(ends, axis=1, keepdims=True)
+    return np.vstack([line[0] + ends[0], line, line[-1] + ends[1]])
 
 
 def bending(case: Case, outputs: Iterable[str], truth: bool) -> None:
@@ -164,7 +184,8 @@ def against_truth(case: Case, outputs: Iterable[str]) -> None:
     (bottom) axial strain, of the micro and of the finest meso result."""
     tables = {state: columns(case, state, True) for state in case.states}
     count = len(tables)
-    fig = style.figure(14 + 2 * min(58.0, 150.0 / count + 6))
+    side = min(58.0, style.WIDTH / count)
+    fig = style.figure(14 + 2 * (side + 4), max(side * count, 0.5 * style.WIDTH))
     axes = fig.subplots(2, count, squeeze=False)
     for column, (state, table) in enumerate(tables.items()):
         sources = results(case, table)
