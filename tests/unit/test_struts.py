@@ -265,7 +265,7 @@ def test_struts_of_a_lattice_are_where_the_bars_are(cut):
     assert min(straight) > 0.99
     for strut in struts:
         assert_allclose(strut.length, STEP, atol=1.2)
-        assert_allclose(strut.radius, 2.0, rtol=0.08)
+        assert_allclose(strut.radius, np.sqrt(9 / np.pi), rtol=0.03)  # 9 voxels a section
 
 
 def test_an_affine_field_stretches_every_strut_of_a_lattice_and_bends_none(cut, lattice):
@@ -341,7 +341,8 @@ def test_points_find_their_place_on_a_curve():
     line = np.column_stack([s, 0.01 * s**2, 0 * s])
     curve = Curve.fit((0, 10), s, line, np.ones(40))
     normal = np.column_stack([-0.02 * s, np.ones(40), 0 * s])
-    assert_allclose(curve.projected(line + normal, s + 0.5), s, atol=1e-6)
+    found = curve.projected(line + normal, s + 0.5)
+    assert_allclose(found, s, atol=2 * 0.5 * 0.02**3)  # each step takes off curvature x distance
 
 
 # ------------------------------------------------------------------------ tables and judging
