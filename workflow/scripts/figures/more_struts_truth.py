@@ -1,7 +1,7 @@
 """Beyond the paper: measured struts against the truth, as a picture and as a table."""
 
 from addvc.report.case import Case
-from addvc.report.struts import against_truth, truth_rows
+from addvc.report.struts_truth import against_truth, truth_rows
 from addvc.report.tables import write_table
 from addvc.runtime import job
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from addvc.analysis.strut_store import load_partition, read_columns
 from addvc.analysis.strut_table import KINDS, MESO
@@ -16,6 +17,10 @@ from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, oblique, render
 
 BINS = np.linspace(0, 1, 21)
+COMPARED = ("bending_share", "axial_strain")
+PALE = (1.0, 0.45, 0.15)
+"""How full the colours of bending, stretching and torsion are."""
+
 TRUTHS = ("_beams", "_field")
 """Endings of the columns of a truth, the better one first."""
 
@@ -29,7 +34,7 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     points, faces, owner = tubes(struts, junctions)
     sources = {case.micro[0]: "", case.finest: MESO}
     fig, axes = style.panels(2, 2, aspect(view, points), spare=9, bar=16)
-    for row, (ax, column) in enumerate(zip(axes, ("bending_share", "axial_strain"), strict=True)):
+    for row, (ax, column) in enumerate(zip(axes, COMPARED, strict=True)):
         valid = table["valid"] > 0
         norm = Normalize(0, 1) if row == 0 else strain_range(table, sources.values())
         cmap = style.MAGNITUDE if row == 0 else style.SIGNED
@@ -73,7 +78,9 @@ def tubes(struts: list[Strut], junctions: np.ndarray) -> tuple[np.ndarray, np.nd
         parts.append((tube.triangulate(), number))
     for junction, radius in zip(junctions, 1.15 * size, strict=True):
         if radius > 0:
-            ball = pyvista.Sphere(radius, junction, theta_resolution=14, phi_resolution=14)
+            ball = pyvista.Sphere(
+                radius=radius, center=junction, theta_resolution=14, phi_resolution=14
+            )
             parts.append((ball.triangulate(), FREE_END))
     first = np.cumsum([0, *(part.n_points for part, _ in parts)])
     return (
@@ -102,9 +109,12 @@ def bending(case: Case, outputs: Iterable[str], truth: bool) -> None:
     fig = style.figure(16 + 58 * rows)
     axes = fig.subplots(rows, width, squeeze=False).ravel()
     sources = results(case, next(iter(tables.values())))
+    for ax in axes[1 : len(tables)]:
+        ax.sharey(axes[0])
     for number, (ax, state) in enumerate(zip(axes, case.states, strict=False)):
         histogram(ax, tables[state], sources)
         style.headline(ax, case.title(state, case.micro[0]), number)
+    axes[0].set_ylim(bottom=0)
     energy_shares(axes[len(tables)], case, tables, sources)
     style.headline(axes[len(tables)], "all valid struts", len(tables))
     for ax in axes[count:]:
@@ -149,7 +159,7 @@ def histogram(ax: Axes, table: dict, sources: dict) -> None:
         ax.stairs(part, BINS, color=colour, lw=1.4, ls="--" if name == "truth" else "-")
     ax.axvline(0.5, color="#999999", lw=0.6, ls=":")
     ax.set(xlabel="share of bending in a strut (–)", ylabel="share of the foam's energy (–)")
-    ax.set(xlim=(0, 1), ylim=(0, None))
+    ax.set_xlim(0, 1)
 
 
 def energy_shares(ax: Axes, case: Case, tables: dict[int, dict], sources: dict) -> None:
@@ -160,97 +170,23 @@ def energy_shares(ax: Axes, case: Case, tables: dict[int, dict], sources: dict) 
         for n, (ending, colour) in enumerate(sources.values()):
             total = energies(tables[state], ending, use).sum(axis=1)
             part = total / max(total.sum(), 1e-300)
-            x = place + (n + 0.5) * slot - 0.4
-            for share, base, alpha in zip(part, np.cumsum([0, *part]), (1.0, 0.45, 0.15),
-                                          strict=False):  # fmt: skip
-                ax.bar(x, share, 0.9 * slot, bottom=base, color=colour, alpha=alpha, lw=0)
+            x, base = place + (n + 0.5) * slot - 0.4, np.cumsum([0, *part])
+            for share, low, alpha in zip(part, base, PALE, strict=False):
+                ax.bar(x, share, 0.9 * slot, bottom=low, color=colour, alpha=alpha, lw=0)
     ax.axhline(0.5, color="#999999", lw=0.6, ls=":")
     ax.set(xticks=range(len(case.states)), ylim=(0, 1), xlabel="loading state")
-    ax.set(ylabel="bending (full), stretching, torsion (–)")
-    ax.set_xticklabels([case.labels[n] for n in case.states])
+    ax.set(ylabel="share of the foam's energy (–)")
+    ax.set_xticklabels([case.labels[n] for n in case.states], fontsize=7)
 
 
 def legend(fig: Figure, sources: dict) -> None:
-    """The names of the results, below all panels."""
+    """The names of the results and of the energies, below all panels."""
     handles = [
         style.line(colour, name, ls="--" if name == "truth" else "-")
         for name, (_, colour) in sources.items()
     ]
+    handles += [
+        Patch(color=style.DARK, alpha=alpha, lw=0, label=kind)
+        for kind, alpha in zip(KINDS, PALE, strict=True)
+    ]
     fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-
-
-def against_truth(case: Case, outputs: Iterable[str]) -> None:
-    """Measured against true, a point a valid strut, a column a state: (top) share of bending,
-    (bottom) axial strain, of the micro and of the finest meso result."""
-    tables = {state: columns(case, state, True) for state in case.states}
-    count = len(tables)
-    side = min(58.0, style.WIDTH / count)
-    fig = style.figure(14 + 2 * (side + 4), max(side * count, 0.5 * style.WIDTH))
-    axes = fig.subplots(2, count, squeeze=False)
-    for column, (state, table) in enumerate(tables.items()):
-        sources = results(case, table)
-        ending, use = sources.pop("truth")[0], trusted(table, results(case, table))
-        for row, (ax, name) in enumerate(
-            zip(axes[:, column], ("bending_share", "axial_strain"), strict=True)
-        ):
-            pairs = {
-                source: (table[name + ending][use], table[name + own][use], colour)
-                for source, (own, colour) in sources.items()
-            }
-            scatter(ax, pairs, (0, 1) if row == 0 else None)
-            style.headline(ax, case.title(state, case.micro[0]), count * row + column)
-    axes[0, 0].set_ylabel("share of bending, measured (–)")
-    axes[1, 0].set_ylabel("axial strain, measured (–)")
-    for row, word in zip(axes, ("share of bending", "axial strain"), strict=True):
-        for ax in row:
-            ax.set_xlabel(f"{word}, truth (–)")
-    sources.pop("truth", None)
-    handles = [style.line(c, n, ls="", marker="o") for n, (_, c) in sources.items()]
-    fig.legend(handles=handles, loc="outside lower center", ncols=2)
-    style.save(fig, outputs)
-
-
-def scatter(ax: Axes, pairs: dict, limits: tuple[float, float] | None) -> None:
-    """Measured over true values; without limits, three times the range of the true ones."""
-    if limits is None:
-        reach = 3 * max(float(np.abs(next(iter(pairs.values()))[0]).max(initial=0)), 1e-4)
-        limits = (-reach, reach)
-    for true, measured, colour in pairs.values():
-        shown = np.clip(measured, *limits)
-        ax.plot(true, shown, "o", color=colour, ms=2.2, alpha=0.55, mew=0, clip_on=False)
-    ax.plot(limits, limits, color="#777777", lw=0.7, zorder=0)
-    ax.set(xlim=limits, ylim=limits, aspect="equal")
-
-
-def truth_rows(case: Case) -> list[list[str]]:
-    """The table: figures of each result against both truths, a column a state."""
-    read = {n: case.json(f"analysis/struts_truth_state{n}.json") for n in case.states}
-    first = read[case.states[0]]
-    rows = [["Struts", "Against", "Quantity", "Unit", *(case.labels[n] for n in case.states)]]
-    names = {"field": "true displacement", "beams": "beams of the twin"}
-    for source, others in first.items():
-        for other in others:
-            found = [read[n][source][other] for n in case.states]
-            for key, (quantity, unit) in QUANTITIES.items():
-                values = [_number(entry[key]) for entry in found]
-                rows.append([names.get(source, source), names[other], quantity, unit, *values])
-            for place, whose in enumerate(("of these", "of the truth")):
-                values = [_number(entry["foam"][place]) for entry in found]
-                quantity = f"share of bending in the energy of all, {whose}"
-                rows.append([names.get(source, source), names[other], quantity, "–", *values])
-    return rows
-
-
-QUANTITIES = {
-    "struts": ("struts compared", "–"),
-    "bending_share_correlation": ("correlation of the share of bending", "–"),
-    "same_class": ("struts of the same class (bending over or under one half)", "–"),
-    "axial_strain_correlation": ("correlation of the axial strain", "–"),
-    "axial_strain_rms": ("rms difference of the axial strain", "–"),
-}
-
-
-def _number(value: float | int | None) -> str:
-    if value is None:
-        return "–"
-    return str(value) if isinstance(value, int) else f"{value:.3g}"
