@@ -1,5 +1,7 @@
 """Struts as objects, and their mechanics under known motions."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -15,7 +17,15 @@ from addvc.analysis.strut_store import (
     strut_of_cells,
     write_columns,
 )
-from addvc.analysis.strut_table import MESO, UNDECIDED, described, foam, strut_table
+from addvc.analysis.strut_table import (
+    GEOMETRY,
+    MECHANICS,
+    MESO,
+    UNDECIDED,
+    described,
+    foam,
+    strut_table,
+)
 from addvc.analysis.struts import Strut, partition
 from addvc.analysis.struts_truth import BEAMS, FIELD, judged, unloaded
 from addvc.errors import GeometryError
@@ -376,6 +386,13 @@ def test_every_column_has_its_unit_and_meaning(cut, lattice):
     fields = {"": 0.01 * points, MESO: 0.02 * points}
     table = strut_table(cut[0][:3], points, fields, np.ones(len(points)), NU)
     assert set(table) == set(described(["", MESO]))
+
+
+def test_the_readme_explains_every_column():
+    text = (Path(__file__).parents[2] / "workflow" / "README.md").read_text(encoding="utf-8")
+    for name, (unit, meaning) in (GEOMETRY | MECHANICS).items():
+        row = next(row for row in text.splitlines() if f"`{name}`" in row and row.startswith("|"))
+        assert f"| {unit} | {meaning} |" in row
 
 
 def test_struts_with_doubtful_nodes_or_a_neck_are_flagged(cut, lattice):
