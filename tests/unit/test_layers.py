@@ -21,8 +21,17 @@ MAY_IMPORT["twin"] = {"twin", "images", "fem", "errors"}
 NEEDED = {"output", "log", "benchmark", "conda", "threads", "resources", "params", "script"}
 WITHOUT_SCRIPT = {"all", "figures"}
 
-JUDGES = {"analysis/truth.py", "analysis/twin_check.py"}  # modules that may import the twin
-JUDGING = {"truth_error", "difficulty", "twin_check"}  # rules and scripts that may read its truth
+JUDGES = {
+    "analysis/truth.py",
+    "analysis/twin_check.py",
+    "analysis/struts_truth.py",
+}  # modules that may import the twin
+JUDGING = {
+    "truth_error",
+    "struts_truth",
+    "difficulty",
+    "twin_check",
+}  # rules and scripts that may read its truth
 
 
 def imported(path):

@@ -75,6 +75,32 @@ if HAS_TRUTH:
         script:
             "../scripts/analysis/truth_error.py"
 
+    rule struts_truth:
+        input:
+            struts=f"{R}/geometry/struts.h5",
+            mesh=f"{R}/geometry/micro.vtu",
+            table=f"{R}/struts_state{{state}}.csv",
+            truth=TRUTH,
+        output:
+            table=f"{R}/analysis/struts_truth_state{{state}}.csv",
+            figures=f"{R}/analysis/struts_truth_state{{state}}.json",
+        log:
+            f"{R}/logs/struts_truth/state{{state}}.log",
+        benchmark:
+            f"{R}/benchmarks/struts_truth/state{{state}}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 10.0),
+            runtime=60,
+        params:
+            code=code("analysis/struts_truth.py"),
+            nu=config["micro"]["nu"],
+            names=[MICRO[0], FINEST],
+        script:
+            "../scripts/analysis/struts_truth.py"
+
     rule difficulty:
         input:
             mesh=f"{R}/geometry/micro.vtu",
@@ -129,6 +155,57 @@ if KIND == "twin":
             "../scripts/analysis/twin_check.py"
 
 
+rule strut_partition:
+    input:
+        solid=f"{R}/geometry/solid.h5",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/volume0.h5",
+        mesh=f"{R}/geometry/micro.vtu",
+    output:
+        struts=f"{R}/geometry/struts.h5",
+        picture=f"{R}/geometry/struts.vtu",
+    log:
+        f"{R}/logs/strut_partition/all.log",
+    benchmark:
+        f"{R}/benchmarks/strut_partition/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 10.0),
+        runtime=60,
+    params:
+        code=code("analysis/strut_partition.py"),
+    script:
+        "../scripts/analysis/strut_partition.py"
+
+
+rule struts:
+    input:
+        struts=f"{R}/geometry/struts.h5",
+        field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
+        meso=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
+    output:
+        table=f"{R}/struts_state{{state}}.csv",
+        notes=f"{R}/struts_state{{state}}.json",
+    log:
+        f"{R}/logs/struts/state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/struts/state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1200, 10.0),
+        runtime=60,
+    params:
+        code=code("analysis/struts.py"),
+        nu=config["micro"]["nu"],
+        names=[MICRO[0], FINEST],
+    script:
+        "../scripts/analysis/struts.py"
+
+
 rule summary:
     input:
         f"{R}/input.json",
@@ -157,6 +234,7 @@ rule summary:
         )
         if HAS_TRUTH
         else [],
+        expand(f"{R}/struts_state{{state}}.json", state=STATES),
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",

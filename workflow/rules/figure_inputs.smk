@@ -34,6 +34,22 @@ def fields(*names):
     return expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES)
 
 
+def struts():
+    """What the struts of the default micro method and of the finest meso mesh undergo."""
+    return [
+        f"{R}/geometry/struts.h5",
+        *expand(f"{R}/struts_state{{state}}.csv", state=STATES),
+        *solutions(FINEST, MICRO[0]),
+        *fields(MICRO[0]),
+    ]
+
+
+def struts_truth(suffix):
+    """Struts against the truth, where there is one."""
+    name = f"{R}/analysis/struts_truth_state{{state}}.{suffix}"
+    return expand(name, state=STATES) if HAS_TRUTH else []
+
+
 def shown(name, number, category, shows):
     """A figure of the report and of the list of all figures, with its caption."""
     FIGURES.append(f"{R}/figures/{name}")

@@ -436,6 +436,53 @@ if STATES:
         script:
             "../scripts/figures/fig17.py"
 
+    rule more_struts:
+        input:
+            SPECIMEN,
+            smooth(0),
+            struts(),
+        output:
+            shown("more_struts.png", "more_struts", "Struts", "network of struts"),
+        log:
+            f"{R}/logs/figures/more_struts.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_struts.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 10.0),
+            runtime=15,
+        params:
+            code=code("figures/more_struts.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_struts.py"
+
+    rule more_bending:
+        input:
+            struts(),
+            struts_truth("csv"),
+        output:
+            shown("more_bending.png", "more_bending", "Struts", "bending or stretching"),
+            drawing("more_bending"),
+        log:
+            f"{R}/logs/figures/more_bending.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_bending.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 2.0),
+            runtime=10,
+        params:
+            code=code("figures/more_bending.py"),
+            case=FIGURE_CASE,
+            truth=HAS_TRUTH,
+        script:
+            "../scripts/figures/more_bending.py"
+
     rule more_convergence:
         input:
             solutions(*MESO, *MICRO),
@@ -490,6 +537,43 @@ if STATES and HAS_TRUTH:
             case=FIGURE_CASE,
         script:
             "../scripts/figures/more_error.py"
+
+    rule more_struts_truth:
+        input:
+            struts(),
+            struts_truth("csv"),
+            struts_truth("json"),
+        output:
+            table=shown(
+                "more_struts_truth.csv",
+                "more_struts_truth",
+                "Tables",
+                "struts against the truth",
+            ),
+            pictures=[
+                shown(
+                    "more_struts_truth.png",
+                    "more_struts_truth",
+                    "Struts",
+                    "struts against the truth",
+                ),
+                drawing("more_struts_truth"),
+            ],
+        log:
+            f"{R}/logs/figures/more_struts_truth.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_struts_truth.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 2.0),
+            runtime=10,
+        params:
+            code=code("figures/more_struts_truth.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_struts_truth.py"
 
     rule more_difficulty:
         input:

@@ -96,7 +96,7 @@ def state_figures(
         "start": notes["best"],
         "candidates": notes["candidates"],
         "verdict": verdict(best["converged"], best["valid_nodes"]),
-        "struts": None,
+        "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
     }
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from addvc.fem.mesh import Mesh
 
 LIMIT = 3.0  # of the noise of a difference of two images
+MOST = 0.9  # of the nodes of a strut, by volume
 
 
 def residual_limit(noise: float) -> float:
@@ -25,6 +26,11 @@ def nodal_residual(mesh: Mesh, cell_square: np.ndarray) -> np.ndarray:
 def valid_nodes(mesh: Mesh, cell_square: np.ndarray, noise: float) -> np.ndarray:
     """(n,) bool: the residual around the node is below the limit, and known."""
     return nodal_residual(mesh, cell_square) <= residual_limit(noise)
+
+
+def valid_strut(valid: np.ndarray, weight: np.ndarray) -> bool:
+    """Whether a strut can be trusted: of its nodes, with weights (k,), most are `valid` (k,)."""
+    return bool(weight @ (valid > 0) >= MOST * weight.sum())
 
 
 def verdict(converged: bool, valid_share: float) -> str:

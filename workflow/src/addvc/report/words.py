@@ -95,9 +95,21 @@ def answer(summary: dict) -> list[str]:
         lines.append(
             f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
             f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
-            f"valid{error_words(found['error'])}."
+            f"valid{error_words(found['error'])}.{strut_words(state.get('struts'))}"
         )
     return lines
+
+
+def strut_words(struts: dict | None) -> str:
+    """How the foam carries its load, as far as its struts could be measured."""
+    if not struts:
+        return ""
+    count = f"{struts['valid']} valid struts ({struts['flagged']} flagged)"
+    if struts["bending_share"] is None:
+        return f" No share of bending: {count}."
+    verdict = "Bending" if struts["bending_share"] > 0.5 else "Not bending"
+    share = f"{struts['bending_share']:.0%} of the energy of {count} is in bending"
+    return f" {verdict}-dominated: {share}."
 
 
 def warnings(summary: dict) -> list[str]:

@@ -1,0 +1,80 @@
+"""Beyond the paper: measured struts against the truth, of a synthetic test."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from addvc.report import style
+from addvc.report.case import Case
+from addvc.report.struts import COMPARED, columns, results, trusted
+
+QUANTITIES = {
+    "struts": ("struts compared", "–"),
+    "bending_share_correlation": ("correlation of the share of bending", "–"),
+    "same_class": ("struts of the same class (bending over or under one half)", "–"),
+    "axial_strain_correlation": ("correlation of the axial strain", "–"),
+    "axial_strain_rms": ("rms difference of the axial strain", "–"),
+}
+
+
+def against_truth(case: Case, outputs: Iterable[str]) -> None:
+    """Measured against true, a point a valid strut, a column a state: (top) share of bending,
+    (bottom) axial strain, of the micro and of the finest meso result."""
+    tables = {state: columns(case, state, True) for state in case.states}
+    count = len(tables)
+    width = max(min(62.0, style.WIDTH / count) * count, 0.6 * style.WIDTH)
+    fig = style.figure(124, width)
+    axes = fig.subplots(2, count, squeeze=False)
+    for column, (state, table) in enumerate(tables.items()):
+        sources = results(case, table)
+        use, truth = trusted(table, sources), sources.pop("truth")[0]
+        for row, (ax, name, unit) in enumerate(zip(axes[:, column], COMPARED, (1, 100),
+                                                   strict=True)):  # fmt: skip
+            for own, colour in sources.values():
+                pair = (unit * table[name + ending][use] for ending in (truth, own))
+                scatter(ax, *pair, colour, wide=row == 1)
+            title = case.title(state, case.micro[0]).replace(": ", ":\n")
+            style.headline(ax, title, count * row + column)
+            ax.set_xlabel(("share of bending,\ntruth (–)", "axial strain,\ntruth (%)")[row])
+    axes[0, 0].set_ylabel("share of bending, measured (–)")
+    axes[1, 0].set_ylabel("axial strain, measured (%)")
+    handles = [style.line(c, n, ls="", marker="o") for n, (_, c) in sources.items()]
+    fig.legend(handles=handles, loc="outside lower center", ncols=2)
+    style.save(fig, outputs)
+
+
+def scatter(ax: Axes, true: np.ndarray, measured: np.ndarray, colour: str, wide: bool) -> None:
+    """Measured over true values, from 0 to 1, or, where `wide`, over the range of the true ones and
+    three times that; what is beyond is on the border."""
+    reach = max(float(np.abs(true).max(initial=0)), 1e-6)
+    x, y = ((-reach, reach), (-3 * reach, 3 * reach)) if wide else ((0, 1), (0, 1))
+    shown = np.clip(measured, *y)
+    ax.plot(true, shown, "o", color=colour, ms=2.2, alpha=0.55, mew=0, clip_on=False)
+    ax.plot(x, x, color="#777777", lw=0.8, zorder=0)
+    ax.set(xlim=x, ylim=y)
+
+
+def truth_rows(case: Case) -> list[list[str]]:
+    """The table: figures of each result against both truths, a column a state."""
+    read = {n: case.json(f"analysis/struts_truth_state{n}.json") for n in case.states}
+    first = read[case.states[0]]
+    rows = [["Struts", "Against", "Quantity", "Unit", *(case.labels[n] for n in case.states)]]
+    names = {"field": "true displacement", "beams": "beams of the twin"}
+    for source, others in first.items():
+        for other in others:
+            found = [read[n][source][other] for n in case.states]
+            for key, (quantity, unit) in QUANTITIES.items():
+                values = [_number(entry[key]) for entry in found]
+                rows.append([names.get(source, source), names[other], quantity, unit, *values])
+            for place, whose in enumerate(("of these", "of the truth")):
+                values = [_number(entry["foam"][place]) for entry in found]
+                quantity = f"share of bending in the energy of all, {whose}"
+                rows.append([names.get(source, source), names[other], quantity, "–", *values])
+    return rows
+
+
+def _number(value: float | int | None) -> str:
+    if value is None:
+        return "–"
+    return str(value) if isinstance(value, int) else f"{value:.3g}"
