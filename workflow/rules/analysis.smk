@@ -4,6 +4,7 @@
 rule residual:
     input:
         mesh=f"{R}/geometry/micro.vtu",
+        shell=f"{R}/geometry/shell.h5",
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
         fields=on_micro(RESULTS),

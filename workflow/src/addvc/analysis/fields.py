@@ -3,7 +3,7 @@
 import numpy as np
 
 from addvc.analysis.residuals import by_cell
-from addvc.analysis.validity import valid_nodes
+from addvc.analysis.validity import nodal_residual, valid_nodes
 from addvc.correlation.transfer import locate
 from addvc.fem.mesh import Mesh
 from addvc.fem.operators import strain
@@ -14,16 +14,20 @@ def result_fields(
 ) -> tuple[dict, dict]:
     """Point and cell data of u (n, 3) on `mesh`, the residual being known on the `micro` mesh.
 
-    Points: displacement (voxels), valid. Cells: strain (m, 9), its Frobenius norm (the paper's von
-    Mises strain), residual (grey levels; nan in meso cells that hold no strut)."""
+    Points: displacement (voxels), residual_rms around the node (grey levels), valid. Cells: strain
+    (m, 9), its Frobenius norm (the paper's von Mises strain), residual (grey levels). nan where a
+    meso cell holds no strut."""
     r, w, inside = residual["r"], residual["weight"], residual["inside"]
     mean = by_cell(r, w, inside, len(micro.cells))
-    square = by_cell(r.astype(float) ** 2, w, inside, len(micro.cells))
+    around = np.sqrt(residual["node_square"])
     if not np.array_equal(mesh.cells, micro.cells):
         owner, _ = locate(mesh, micro.points[micro.cells].mean(axis=1))
-        mean, square = (by_owner(values, owner, len(mesh.cells)) for values in (mean, square))
+        mean = by_owner(mean, owner, len(mesh.cells))
+        held, _ = locate(mesh, micro.points)
+        around = nodal_residual(mesh, by_owner(residual["node_square"], held, len(mesh.cells)))
     tensor = strain(mesh, u)
-    points = {"displacement": u, "valid": valid_nodes(mesh, square, noise).astype(np.uint8)}
+    valid = valid_nodes(around, noise).astype(np.uint8)
+    points = {"displacement": u, "residual_rms": around, "valid": valid}
     cells = {
         "strain": tensor.reshape(-1, 9),
         "strain_norm": np.linalg.norm(tensor, axis=(1, 2)),
