@@ -8,8 +8,9 @@ The section at s of the centre line c moves to r(s) and turns by R(s); with t th
 [Simo1986]. A strut loaded at its ends only, of uniform section, has bending that is linear in s, and
 twist, stretch and shear that are constant: these 8 coefficients and the 6 of a rigid motion are fitted
 to the nodes of the strut, x = r(s) + R(s) (X - c(s)), by least squares weighted with volume. Rotations
-are finite, so that a rigid motion has no strain. The scatter of the nodes about the fit gives the
+are finite, so that a rigid motion has no strain. The scatter of the nodes about the fit gives a
 covariance of the coefficients, section by section, since errors of neighbours go together [Liang1986].
+What the noise of the images does to the displacement has to be added: it moves whole ends.
 """
 
 from dataclasses import dataclass
@@ -86,8 +87,13 @@ class StrutMotion:
     converged: bool
 
 
-def strut_motion(strut: Strut, points: np.ndarray, u: np.ndarray) -> StrutMotion:
-    """The motion of a strut whose nodes at points (k, 3) are displaced by u (k, 3)."""
+def strut_motion(
+    strut: Strut, points: np.ndarray, u: np.ndarray, draws: np.ndarray | None = None
+) -> StrutMotion:
+    """The motion of a strut whose nodes at points (k, 3) are displaced by u (k, 3).
+
+    draws (d, k, 3): displacements that the noise of the images makes; what the coefficients make of
+    them is added to their covariance, since noise that moves a whole end leaves no scatter."""
     beam, weight = Beam.of(strut), strut.weight / strut.weight.sum()
     below = np.minimum(strut.place.astype(int), len(beam.chord) - 1)
     at = Places(below, (strut.place - below)[:, None])
@@ -107,6 +113,9 @@ def strut_motion(strut: Strut, points: np.ndarray, u: np.ndarray) -> StrutMotion
             break
     pushes = np.einsum("pki,ki,k->kp", slopes, error, weight)
     covariance = clustered(normal, pushes, sections(strut))[RIGID:, RIGID:]
+    if draws is not None:
+        found = np.linalg.solve(normal, np.einsum("pki,dki,k->pd", slopes, draws, weight))[RIGID:]
+        covariance = covariance + found @ found.T / len(draws)
     scatter = float(np.sqrt(weight @ (error**2).sum(axis=1)))
     return StrutMotion(beam, values, covariance, motion, scatter, turn, converged)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from addvc.analysis.strut_energy import KINDS
-from addvc.analysis.strut_table import mechanics
+from addvc.analysis.strut_table import Measured, mechanics
 from addvc.analysis.struts import Strut
 from addvc.analysis.truth import Judge
 from addvc.twin.store import load_struts
@@ -44,10 +44,10 @@ def true_columns(
 ) -> dict[str, np.ndarray]:
     """Columns of both truths, a row a measured strut, nan where not known; path: of the truth,
     points (n, 3): the micro nodes."""
-    u = truth.displacement(points, state)
-    rows = [mechanics(strut, points, u, nu) for strut in struts]
+    field = Measured(points, truth.displacement(points, state))
+    found = mechanics(struts, field, np.array([not strut.broken for strut in struts]), nu)
     names = (*KINDS, *COMPARED)
-    columns = {name + FIELD: np.array([row[name] for row in rows]) for name in names}
+    columns = {name + FIELD: np.array(found[name]) for name in names}
     volume = np.array([strut.span * strut.area.mean() for strut in struts])
     columns[f"bending_share{FIELD}"][unloaded(columns, FIELD, volume)] = np.nan
     if not isinstance(truth, Truth):
