@@ -494,7 +494,7 @@ def test_what_is_measured_right_is_judged_right():
     energies = rng.random((30, 3))
     table = table_of(energies)
     true = {name + end: table[name] for end in (FIELD, BEAMS)
-            for name in (*KINDS, "bending_share", "axial_strain")}  # fmt: skip
+            for name in (*KINDS, "bending_share", "axial_strain", "bending_share_std")}  # fmt: skip
     figures = judged(table, true, {"micro": ""})
     for found in (*figures["micro"].values(), figures["field"]["beams"]):
         assert_allclose(found["bending_share_correlation"], 1)
