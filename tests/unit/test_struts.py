@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from addvc.analysis.centre_line import Curve, centre_line
 from addvc.analysis.strut_energy import KINDS, strut_energy
 from addvc.analysis.strut_motion import Beam, frames, integrated, strut_motion
+from addvc.analysis.strut_prior import posterior, prior_variances, spread
 from addvc.analysis.strut_store import (
     load_partition,
     read_columns,
@@ -22,6 +23,7 @@ from addvc.analysis.strut_table import (
     MECHANICS,
     MESO,
     UNDECIDED,
+    Measured,
     described,
     foam,
     strut_table,
@@ -172,20 +174,70 @@ def test_pieces_converge_to_the_arc_with_the_square_of_their_length():
     assert_allclose(order, 2, atol=0.1)
 
 
+def noisy(strut, before, after, count, std=0.05):
+    """Fits of `count` measurements of one motion, with noise at every node."""
+    fits = []
+    for seed in range(2417, 2417 + count):
+        noise = np.random.default_rng(seed).normal(0, std, before.shape)
+        fits.append(strut_motion(strut, before, after + noise - before))
+    return fits
+
+
 def test_the_deviations_are_those_of_repeated_measurements():
     strut, s, across = cylinder(count=300)
-    before = placed(s, across)
     after = placed(s, across, curvature=0.02, stretch=0.005)
-    found = []
-    for seed in range(2417, 2477):
-        noise = np.random.default_rng(seed).normal(0, 0.05, before.shape)
-        energy = fitted(strut, before, after + noise)[1]
-        found.append([energy.axial_strain, energy.axial_strain_std, *energy.energies[:2]])
-    strain, std, bending, stretching = np.array(found).T
+    found = [strut_energy(strut, fit, NU) for fit in noisy(strut, placed(s, across), after, 60)]
+    strain = np.array([energy.axial_strain for energy in found])
+    std = np.array([energy.axial_strain_std for energy in found])
     assert_allclose(np.sqrt(np.mean(std**2)), strain.std(), rtol=0.3)
-    inertia, area = np.pi * RADIUS**4 / 4, np.pi * RADIUS**2
-    assert_allclose(bending.mean(), 0.5 * inertia * 0.02**2 * LENGTH, rtol=0.1)
-    assert_allclose(stretching.mean(), 0.5 * area * 0.005**2 * LENGTH, rtol=0.2)
+    assert_allclose(strain.mean(), 0.005, rtol=0.1)
+
+
+def test_draws_of_noise_that_move_whole_ends_widen_the_deviation():
+    """Noise that stretches the strut from end to end leaves no scatter of its nodes."""
+    strut, s, across = cylinder()
+    before = placed(s, across)
+    sizes = np.random.default_rng(2417).normal(0, 0.01, 400)
+    draws = np.multiply.outer(sizes, s[:, None] * np.eye(3)[0])
+    fit = strut_motion(strut, before, 0 * before, draws)
+    alone = strut_motion(strut, before, 0 * before)
+    std = np.sqrt(fit.covariance[5, 5])
+    assert_allclose(std, np.sqrt(np.mean(sizes**2)), rtol=1e-6)
+    assert np.sqrt(alone.covariance[5, 5]) < 1e-9
+
+
+def test_noise_alone_has_no_energy_and_a_clear_motion_keeps_its_own():
+    strut, s, across = cylinder(count=300)
+    before = placed(s, across)
+    energies = []
+    for curvature in (0.0, 0.05):
+        fits = noisy(strut, before, placed(s, across, curvature), 60)
+        values = np.array([fit.coefficients for fit in fits])
+        variances = prior_variances(values, np.array([fit.covariance for fit in fits]))
+        kept = np.mean([strut_energy(strut, fit, NU, variances).energies for fit in fits], axis=0)
+        raw = np.mean([strut_energy(strut, fit, NU).energies for fit in fits], axis=0)
+        energies.append((kept, raw))
+    (kept, raw), (bent, _) = energies
+    assert kept.sum() < 0.2 * raw.sum()
+    assert_allclose(bent[0], 0.5 * np.pi * RADIUS**4 / 4 * 0.05**2 * LENGTH, rtol=0.05)
+
+
+def test_the_spread_of_a_foam_is_found_behind_the_noise():
+    rng = np.random.default_rng(2417)
+    noise = rng.uniform(0.5, 2, 4000) ** 2
+    square = rng.normal(0, np.sqrt(1.5**2 + noise)) ** 2
+    assert_allclose(spread(square, noise), 1.5**2, rtol=0.1)
+    assert spread(np.zeros(9), np.ones(9)) <= 1e-30
+
+
+def test_what_is_measured_well_stays_and_what_is_noise_goes():
+    values, variances = np.full(8, 3.0), np.full(8, 4.0)
+    mean, covariance = posterior(values, 1e-9 * np.eye(8), variances)
+    assert_allclose(mean, values, rtol=1e-8)
+    assert_allclose(covariance, 1e-9 * np.eye(8), atol=1e-12)
+    mean, covariance = posterior(values, 1e9 * np.eye(8), variances)
+    assert_allclose(mean, 0, atol=1e-7)
+    assert_allclose(covariance, 4 * np.eye(8), rtol=1e-6)
 
 
 def test_normals_are_unit_and_turn_with_the_line():
@@ -278,11 +330,17 @@ def test_struts_of_a_lattice_are_where_the_bars_are(cut):
         assert_allclose(strut.radius, np.sqrt(9 / np.pi), rtol=0.03)  # 9 voxels a section
 
 
+def table_under(struts, points, u, valid=None, draws=None):
+    """The table of struts under one displacement."""
+    valid = np.ones(len(points)) if valid is None else valid
+    return strut_table(struts, {"": Measured(points, u, draws)}, valid, NU)
+
+
 def test_an_affine_field_stretches_every_strut_of_a_lattice_and_bends_none(cut, lattice):
     struts, _ = cut
     points = lattice[2].points
     gradient = 1e-3 * np.array([[2.0, 0, 0], [0, -3, 0], [0, 0, 1]])
-    table = strut_table(struts, points, {"": points @ gradient}, np.ones(len(points)), NU)
+    table = table_under(struts, points, points @ gradient)
     along = [strut.direction @ gradient @ strut.direction for strut in struts]
     assert_allclose(table["axial_strain"], along, atol=2e-5)
     assert max(table["bending_share"]) < 1e-2
@@ -292,7 +350,7 @@ def test_an_affine_field_stretches_every_strut_of_a_lattice_and_bends_none(cut, 
 
 def test_neighbours_share_a_junction(cut, lattice):
     points = lattice[2].points
-    table = strut_table(cut[0], points, {"": 0.01 * points}, np.ones(len(points)), NU)
+    table = table_under(cut[0], points, 0.01 * points)
     near = [{int(n) for n in text.split()} for text in table["neighbours"]]
     assert all(number in near[other] for number, others in enumerate(near) for other in others)
     assert {len(others) for others in near} <= {4, 5, 6, 7, 8, 9, 10}
@@ -383,8 +441,8 @@ def test_tables_come_back_with_numbers_and_words(tmp_path):
 
 def test_every_column_has_its_unit_and_meaning(cut, lattice):
     points = lattice[2].points
-    fields = {"": 0.01 * points, MESO: 0.02 * points}
-    table = strut_table(cut[0][:3], points, fields, np.ones(len(points)), NU)
+    fields = {"": Measured(points, 0.01 * points), MESO: Measured(points, 0.02 * points)}
+    table = strut_table(cut[0][:3], fields, np.ones(len(points)), NU)
     assert set(table) == set(described(["", MESO]))
 
 
@@ -402,7 +460,7 @@ def test_struts_with_doubtful_nodes_or_a_neck_are_flagged(cut, lattice):
     area = struts[2].area.copy()
     area[8] *= 0.1
     struts = [*struts[:2], Strut(**{**vars(struts[2]), "area": area})]
-    table = strut_table(struts, points, {"": 0.01 * points}, valid, NU)
+    table = table_under(struts, points, 0.01 * points, valid)
     assert table["valid"] == [1, 0, 0]
     assert table["whole"] == [1, 1, 0]
 
@@ -436,7 +494,7 @@ def test_what_is_measured_right_is_judged_right():
     energies = rng.random((30, 3))
     table = table_of(energies)
     true = {name + end: table[name] for end in (FIELD, BEAMS)
-            for name in (*KINDS, "bending_share", "axial_strain")}  # fmt: skip
+            for name in (*KINDS, "bending_share", "axial_strain", "bending_share_std")}  # fmt: skip
     figures = judged(table, true, {"micro": ""})
     for found in (*figures["micro"].values(), figures["field"]["beams"]):
         assert_allclose(found["bending_share_correlation"], 1)

@@ -181,8 +181,34 @@ rule strut_partition:
         "../scripts/analysis/strut_partition.py"
 
 
+rule noise_draws:
+    input:
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        factor=f"{R}/dvc/{MICRO[0]}_factor.h5",
+        threshold=f"{R}/geometry/threshold.json",
+    output:
+        f"{R}/dvc/{MICRO[0]}_noise.h5",
+    log:
+        f"{R}/logs/noise_draws/all.log",
+    benchmark:
+        f"{R}/benchmarks/noise_draws/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 3.0),
+        runtime=30,
+    params:
+        code=code("analysis/noise_draws.py"),
+        blur=config["images"]["blur"],
+    script:
+        "../scripts/analysis/noise_draws.py"
+
+
 rule struts:
     input:
+        noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
         struts=f"{R}/geometry/struts.h5",
         field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
         meso=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",

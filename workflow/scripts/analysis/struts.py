@@ -1,7 +1,7 @@
 """What every strut undergoes in a state: motion, bending, stretching, twist, their energies."""
 
 from addvc.analysis.strut_store import load_partition, write_columns
-from addvc.analysis.strut_table import MESO, described, foam, strut_table
+from addvc.analysis.strut_table import MESO, Measured, described, foam, strut_table
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_vtu
 from addvc.images.files import write_json
@@ -11,8 +11,9 @@ with job(snakemake) as log:
     source = snakemake.input
     struts, _ = load_partition(source.struts)
     points, _, point, _ = read_vtu(source.field)
-    fields = {"": point["displacement"], MESO: load_field(source.meso)}
-    table = strut_table(struts, points, fields, point["valid"], snakemake.params.nu)
+    micro = Measured(points, point["displacement"], load_field(source.noise))
+    fields = {"": micro, MESO: Measured(points, load_field(source.meso))}
+    table = strut_table(struts, fields, point["valid"], snakemake.params.nu)
     whole = {
         name: foam(table, suffix)
         for name, suffix in zip(snakemake.params.names, fields, strict=True)

@@ -2,8 +2,8 @@
 
 Per length, for a round section of area A: bending E I k^2 / 2, stretching E A e^2 / 2 and torsion
 G J w^2 / 2, with I = A^2 / 4 pi, J = 2 I, G = E / 2 (1 + nu). Energies are in units of Young's
-modulus times voxel^3. Scatter of the nodes adds to each square what it has of variance, which is
-taken off, so that noise alone has no energy.
+modulus times voxel^3. Noise adds its variance to each square; energies are therefore expectations
+under what is likely of the strut (`strut_prior`), so that noise alone has none.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from addvc.analysis.strut_motion import BENDING, STRETCH, TWIST, StrutMotion
+from addvc.analysis.strut_prior import posterior
 from addvc.analysis.struts import Strut
 
 KINDS = ("bending", "stretching", "torsion")
@@ -53,22 +54,27 @@ def shares(energies: np.ndarray) -> np.ndarray:
     return energies / total if total > 0 else np.full(len(energies), np.nan)
 
 
-def strut_energy(strut: Strut, fit: StrutMotion, nu: float) -> StrutEnergy:
-    """What a motion costs a strut of the sections that the mesh has; nu: Poisson's ratio."""
+def strut_energy(
+    strut: Strut, fit: StrutMotion, nu: float, variances: np.ndarray | None = None
+) -> StrutEnergy:
+    """What a motion costs a strut of the sections that the mesh has; nu: Poisson's ratio; variances
+    (8,): of the coefficients over the foam, None to take them as they were measured."""
     area = (strut.area[1:] + strut.area[:-1]) / 2
     inertia = area**2 / (4 * np.pi)
     forms = quadratic_forms(fit, area, inertia, nu)
-    c, noise = fit.coefficients, fit.covariance
-    found = np.array([c @ form @ c - np.trace(form @ noise) for form in forms])
-    slopes = 2 * np.stack([form @ c for form in forms])
-    covariance = slopes @ noise @ slopes.T
-    curvature = 2 * max(found[0], 0.0) / (inertia @ fit.beam.length)
+    c, noise, doubt = fit.coefficients, fit.covariance, 0 * fit.covariance
+    mean = c
+    if variances is not None:
+        mean, noise = posterior(c, noise, variances)
+        doubt = noise
+    energies = np.array([mean @ form @ mean + np.trace(form @ doubt) for form in forms])
+    slopes = 2 * np.stack([form @ mean for form in forms])
     return StrutEnergy(
-        np.maximum(found, 0.0),
-        covariance,
+        energies,
+        slopes @ noise @ slopes.T,
         float(c[STRETCH][0]),
-        float(np.sqrt(noise[STRETCH, STRETCH][0, 0])),
-        float(np.sqrt(curvature)),
+        float(np.sqrt(fit.covariance[STRETCH, STRETCH][0, 0])),
+        float(np.sqrt(2 * energies[0] / (inertia @ fit.beam.length))),
         float(c[TWIST][0]),
     )
 

@@ -8,8 +8,9 @@ The section at s of the centre line c moves to r(s) and turns by R(s); with t th
 [Simo1986]. A strut loaded at its ends only, of uniform section, has bending that is linear in s, and
 twist, stretch and shear that are constant: these 8 coefficients and the 6 of a rigid motion are fitted
 to the nodes of the strut, x = r(s) + R(s) (X - c(s)), by least squares weighted with volume. Rotations
-are finite, so that a rigid motion has no strain. The scatter of the nodes about the fit gives the
-covariance of the coefficients, section by section, since errors of neighbours go together [Liang1986].
+are finite, so that a rigid motion has no strain. The scatter of the nodes about the fit gives a
+covariance of the coefficients, by leaving out one slice after the other (a jackknife), since errors of
+neighbours go together. What the noise of the images does has to be added: it moves whole ends.
 """
 
 from dataclasses import dataclass
@@ -86,8 +87,13 @@ class StrutMotion:
     converged: bool
 
 
-def strut_motion(strut: Strut, points: np.ndarray, u: np.ndarray) -> StrutMotion:
-    """The motion of a strut whose nodes at points (k, 3) are displaced by u (k, 3)."""
+def strut_motion(
+    strut: Strut, points: np.ndarray, u: np.ndarray, draws: np.ndarray | None = None
+) -> StrutMotion:
+    """The motion of a strut whose nodes at points (k, 3) are displaced by u (k, 3).
+
+    draws (d, k, 3): displacements that the noise of the images makes; what the coefficients make of
+    them is added to their covariance, since noise that moves a whole end leaves no scatter."""
     beam, weight = Beam.of(strut), strut.weight / strut.weight.sum()
     below = np.minimum(strut.place.astype(int), len(beam.chord) - 1)
     at = Places(below, (strut.place - below)[:, None])
@@ -98,15 +104,18 @@ def strut_motion(strut: Strut, points: np.ndarray, u: np.ndarray) -> StrutMotion
         motion = integrated(beam, values, position, turn)
         error, slopes = misfit(beam, motion, at, arm, now)
         normal = np.einsum("pki,qki,k->pq", slopes, slopes, weight, optimize=True)
-        step = np.linalg.solve(normal, np.einsum("pki,ki,k->p", slopes, error, weight))
+        push = np.einsum("pki,ki,k->p", slopes, error, weight)
+        step = np.linalg.lstsq(normal, push, rcond=None)[0]
         position = position + step[:3]
         turn = Rotation.from_rotvec(step[3:6]).as_matrix() @ turn
         values = values + step[RIGID:]
         converged = bool(np.abs(step).max() < SETTLED)
         if converged:
             break
-    pushes = np.einsum("pki,ki,k->kp", slopes, error, weight)
-    covariance = clustered(normal, pushes, sections(strut))[RIGID:, RIGID:]
+    covariance = jackknife(slopes, error, weight, sections(strut))[RIGID:, RIGID:]
+    if draws is not None:
+        found = np.linalg.solve(normal, np.einsum("pki,dki,k->pd", slopes, draws, weight))[RIGID:]
+        covariance = covariance + found @ found.T / len(draws)
     scatter = float(np.sqrt(weight @ (error**2).sum(axis=1)))
     return StrutMotion(beam, values, covariance, motion, scatter, turn, converged)
 
@@ -194,10 +203,18 @@ def sections(strut: Strut) -> np.ndarray:
     return np.minimum((count * place).astype(int), count - 1)
 
 
-def clustered(normal: np.ndarray, pushes: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Covariance (p, p) of least squares with `normal` (p, p), from the gradients (k, p) of the
-    nodes, whose errors go together within each label (k,) [Liang1986]."""
-    count = label.max() + 1
-    sums = np.stack([np.bincount(label, push, count) for push in pushes.T], axis=1)
-    inverse = np.linalg.inv(normal)
-    return inverse @ (sums.T @ sums) @ inverse * count / (count - 1)
+def jackknife(
+    slopes: np.ndarray, error: np.ndarray, weight: np.ndarray, label: np.ndarray
+) -> np.ndarray:
+    """Covariance (p, p) of a least-squares fit with slopes (p, k, 3), errors (k, 3) and weights (k,),
+    from what it would be without each of the slices, label (k,), in turn."""
+    normal = np.einsum("pki,qki,k->pq", slopes, slopes, weight, optimize=True)
+    steps = []
+    for number in range(label.max() + 1):
+        own = label == number
+        part, w = slopes[:, own], weight[own]
+        push = np.einsum("pki,ki,k->p", part, error[own], w)
+        rest = normal - np.einsum("pki,qki,k->pq", part, part, w, optimize=True)
+        steps.append(np.linalg.lstsq(rest, push, rcond=None)[0])
+    steps = np.array(steps)
+    return steps.T @ steps * (len(steps) - 1) / len(steps)

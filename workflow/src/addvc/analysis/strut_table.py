@@ -1,12 +1,14 @@
 """What every strut undergoes in a state, a row a strut, and what the foam does as a whole."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from addvc.analysis.strut_energy import KINDS, StrutEnergy, strut_energy
 from addvc.analysis.strut_motion import StrutMotion, strut_motion
+from addvc.analysis.strut_prior import prior_variances
 from addvc.analysis.struts import Strut
 from addvc.analysis.validity import valid_strut
 from addvc.geometry.skeleton import FREE_END
@@ -32,15 +34,15 @@ GEOMETRY = {
 
 MECHANICS = {
     "axial_strain": ("–", "stretch of the centre line less 1, between the junctions"),
-    "axial_strain_std": ("–", "standard deviation of it, from the scatter of the nodes"),
-    "curvature": ("1/voxel", "change of curvature, rms weighted with the moment of inertia"),
+    "axial_strain_std": ("–", "standard deviation of it, by noise and scatter of the nodes"),
+    "curvature": ("1/voxel", "change of curvature, rms weighted with inertia, without noise"),
     "twist": ("1/voxel", "twist per length"),
     "rotation": ("degree", "by how much the middle has turned"),
-    "bending": ("E voxel^3", "energy of bending, E: Young's modulus of the solid"),
-    "stretching": ("E voxel^3", "energy of stretching"),
-    "torsion": ("E voxel^3", "energy of torsion"),
+    "bending": ("E voxel^3", "expected energy of bending, E: Young's modulus of the solid"),
+    "stretching": ("E voxel^3", "expected energy of stretching"),
+    "torsion": ("E voxel^3", "expected energy of torsion"),
     "bending_share": ("–", "bending / (bending + stretching + torsion)"),
-    "bending_share_std": ("–", "standard deviation of it, from the scatter of the nodes"),
+    "bending_share_std": ("–", "standard deviation of it, by noise and scatter of the nodes"),
     "dominance": ("–", "the kind with over half the energy by one deviation, or undecided"),
     "scatter": ("voxel", "rms distance of the nodes from the motion of a beam"),
 }
@@ -50,26 +52,31 @@ MESO = "_meso"
 """Added to the names of the columns that the finest meso mesh gives."""
 
 
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A displacement u (n, 3) of the nodes at points (n, 3), and what noise makes of it in draws
+    (d, n, 3), None where that is not known; voxels."""
+
+    points: np.ndarray
+    u: np.ndarray
+    draws: np.ndarray | None = None
+
+
 def strut_table(
-    struts: list[Strut],
-    points: np.ndarray,
-    fields: dict[str, np.ndarray],
-    valid: np.ndarray,
-    nu: float,
+    struts: list[Strut], fields: dict[str, Measured], valid: np.ndarray, nu: float
 ) -> dict[str, list]:
-    """Columns by name: the geometry, and the mechanics under each displacement u (n, 3) of the micro
-    nodes at points (n, 3), whose names end in the keys of `fields`. The first is what `valid` (n,)
-    of its nodes judges. nu: Poisson's ratio of the solid."""
+    """Columns by name: the geometry, and the mechanics under each displacement of the micro nodes,
+    whose names end in the keys of `fields`; the first is what `valid` (n,) of the nodes judges. nu:
+    Poisson's ratio of the solid."""
+    sound = np.array([
+        not strut.broken and valid_strut(valid[strut.nodes], strut.weight) for strut in struts
+    ], dtype=bool)  # fmt: skip
     columns: dict[str, list] = {}
-    for suffix, u in fields.items():
-        rows = [mechanics(strut, points, u, nu) for strut in struts]
-        columns |= {name + suffix: [row[name] for row in rows] for name in MECHANICS}
+    for suffix, field in fields.items():
+        found = mechanics(struts, field, sound, nu)
+        columns |= {name + suffix: values for name, values in found.items()}
     measured = np.isfinite(columns["bending_share"])
-    trusted = [
-        int(known and not strut.broken and valid_strut(valid[strut.nodes], strut.weight))
-        for strut, known in zip(struts, measured, strict=True)
-    ]
-    return geometry(struts) | {"valid": trusted} | columns
+    return geometry(struts) | {"valid": list((sound & measured).astype(int))} | columns
 
 
 def geometry(struts: list[Strut]) -> dict[str, list]:
@@ -94,12 +101,36 @@ def neighbours(struts: list[Strut]) -> list[list[int]]:
     return [sorted({n} | at[s.ends[0]] | at[s.ends[1]]) for n, s in enumerate(struts)]
 
 
-def mechanics(strut: Strut, points: np.ndarray, u: np.ndarray, nu: float) -> dict:
-    """A row of the columns of MECHANICS; nan where no motion of a beam was found."""
-    fit = strut_motion(strut, points[strut.nodes], u[strut.nodes])
+def mechanics(
+    struts: list[Strut], field: Measured, sound: np.ndarray, nu: float
+) -> dict[str, list]:
+    """The columns of MECHANICS, nan where no motion of a beam was found; what is likely of a strut is
+    learnt from those that are `sound` (n,)."""
+    fits = [
+        strut_motion(
+            strut,
+            field.points[strut.nodes],
+            field.u[strut.nodes],
+            None if field.draws is None else field.draws[:, strut.nodes],
+        )
+        for strut in struts
+    ]
+    known = sound & np.array([fit.converged for fit in fits], dtype=bool)
+    variances = None
+    if known.any():
+        good = [fit for fit, use in zip(fits, known, strict=True) if use]
+        variances = prior_variances(
+            np.array([fit.coefficients for fit in good]), np.array([fit.covariance for fit in good])
+        )
+    rows = [row(strut, fit, nu, variances) for strut, fit in zip(struts, fits, strict=True)]
+    return {name: [values[name] for values in rows] for name in MECHANICS}
+
+
+def row(strut: Strut, fit: StrutMotion, nu: float, variances: np.ndarray | None) -> dict:
+    """The columns of MECHANICS of one strut."""
     if not fit.converged:
         return dict.fromkeys(MECHANICS, float("nan")) | {"dominance": UNDECIDED}
-    energy = strut_energy(strut, fit, nu)
+    energy = strut_energy(strut, fit, nu, variances)
     return {
         "axial_strain": energy.axial_strain,
         "axial_strain_std": energy.axial_strain_std,

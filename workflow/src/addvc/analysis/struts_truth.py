@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from addvc.analysis.strut_energy import KINDS
-from addvc.analysis.strut_table import mechanics
+from addvc.analysis.strut_table import Measured, mechanics
 from addvc.analysis.struts import Strut
 from addvc.analysis.truth import Judge
 from addvc.twin.store import load_struts
@@ -44,10 +44,10 @@ def true_columns(
 ) -> dict[str, np.ndarray]:
     """Columns of both truths, a row a measured strut, nan where not known; path: of the truth,
     points (n, 3): the micro nodes."""
-    u = truth.displacement(points, state)
-    rows = [mechanics(strut, points, u, nu) for strut in struts]
-    names = (*KINDS, *COMPARED)
-    columns = {name + FIELD: np.array([row[name] for row in rows]) for name in names}
+    field = Measured(points, truth.displacement(points, state))
+    found = mechanics(struts, field, np.array([not strut.broken for strut in struts]), nu)
+    names = (*KINDS, *COMPARED, "bending_share_std")
+    columns = {name + FIELD: np.array(found[name]) for name in names}
     volume = np.array([strut.span * strut.area.mean() for strut in struts])
     columns[f"bending_share{FIELD}"][unloaded(columns, FIELD, volume)] = np.nan
     if not isinstance(truth, Truth):
@@ -60,6 +60,7 @@ def true_columns(
     values["bending_share"] = np.divide(
         values["bending"], total, out=np.full(len(total), np.nan), where=total > 0
     )
+    names = (*KINDS, *COMPARED)
     columns |= {n + BEAMS: np.where(known, values[n][number], np.nan) for n in names}
     columns[f"bending_share{BEAMS}"][unloaded(columns, BEAMS, volume)] = np.nan
     return columns | {"true_strut": number}
@@ -89,19 +90,26 @@ def judged(table: dict, true: dict, results: dict[str, str]) -> dict:
 
 def agreement(columns: dict, first: str, second: str, use: np.ndarray) -> dict:
     """Of the columns with two suffixes, over struts `use` (n,) that both know: correlation of the
-    share of bending and of the axial strain, share of equal classes, share of bending in all."""
+    share of bending and of the axial strain, share of equal classes, share of struts whose class is
+    sure by a deviation and how many of those are right, share of bending in all."""
     values = {
         name: (np.asarray(columns[name + first], float), np.asarray(columns[name + second], float))
         for name in (*KINDS, *COMPARED)
     }
     both = use & np.logical_and.reduce([np.isfinite(v) for pair in values.values() for v in pair])
+    sure = np.abs(values["bending_share"][0] - 0.5) > np.asarray(
+        columns[f"bending_share_std{first}"]
+    )
+    decided = sure[both]
     share, strain = ([v[both] for v in values[name]] for name in COMPARED)
     return {
         "struts": int(both.sum()),
         "bending_share_correlation": correlation(*share),
         "axial_strain_correlation": correlation(*strain),
         "axial_strain_rms": rms(strain[0] - strain[1]),
-        "same_class": float(np.mean((share[0] > 0.5) == (share[1] > 0.5))) if both.any() else None,
+        "same_class": mean((share[0] > 0.5) == (share[1] > 0.5)),
+        "decided": mean(decided),
+        "decided_same_class": mean(((share[0] > 0.5) == (share[1] > 0.5))[decided]),
         "foam": [foam_share(lambda kind, n=n: values[kind][n][both]) for n in (0, 1)],
     }
 
@@ -111,6 +119,11 @@ def correlation(a: np.ndarray, b: np.ndarray) -> float | None:
     if len(a) < 3 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return None
     return float(np.corrcoef(a, b)[0, 1])
+
+
+def mean(right: np.ndarray) -> float | None:
+    """Share of what is right (n,)."""
+    return float(np.mean(right)) if len(right) else None
 
 
 def rms(x: np.ndarray) -> float | None:

@@ -13,6 +13,8 @@ QUANTITIES = {
     "struts": ("struts compared", "–"),
     "bending_share_correlation": ("correlation of the share of bending", "–"),
     "same_class": ("struts of the same class (bending over or under one half)", "–"),
+    "decided": ("struts whose class is sure by a deviation", "–"),
+    "decided_same_class": ("of these, struts of the same class", "–"),
     "axial_strain_correlation": ("correlation of the axial strain", "–"),
     "axial_strain_rms": ("rms difference of the axial strain", "–"),
 }
