@@ -41,7 +41,9 @@ from addvc.images.spline import gaussian_blur, spline_value_gradient
 log = logging.getLogger(__name__)
 
 MAXWELL_MEDIAN = 1.538  # median length of a vector of three normal deviates of variance one
-LEAST_SHARE = 0.1  # of the voxels take part, however noisy
+STRONG = 99  # percentile of the gradients that stands for those of the structure
+CLEARLY = 0.25  # of that is enough, however noisy
+BLANK = 1e-5  # of the grey level: less is round-off
 NOMINAL_CELL = 28.0  # voxels: the cell size that LEVELS is written for
 
 
@@ -64,18 +66,20 @@ LEVELS = (
     Level(32, 3.0, 16, 2, 4, 6),
     Level(16, 3.0, 10, 2, 4, 10),
     Level(16, 2.0, 10, 2, 6, 10),
-    Level(8, 1.5, 4, 2, 6, 6, 3e-2, 60),
-    Level(8, 0.0, 4, 1, 8, 5, 3e-2, 60),
+    Level(8, 1.5, 6, 2, 6, 6, 3e-2, 60),
+    Level(8, 0.0, 6, 1, 8, 5, 3e-2, 60),
 )
 
 
 @dataclass(frozen=True)
 class FreeformOptions:
-    """Loading axis, levels from coarse to fine, and the rms(du) in voxels that ends a level."""
+    """Loading axis; levels from coarse to fine; the rms(du) in voxels that ends a level, and the
+    one below which the last level has settled: a start needs no more."""
 
     axis: int
     levels: tuple[Level, ...] = LEVELS
     tolerance: float = 1e-2
+    settled: float = 0.1
 
 
 def freeform_options(section: dict, cell_size: float, axis: int) -> FreeformOptions:
@@ -121,19 +125,18 @@ def sample(grid: SplineGrid, coefficients: np.ndarray, level: Level) -> Sampling
 def clear_points(coefficients: np.ndarray, stride: int, clear: float) -> np.ndarray:
     """Every stride-th voxel centre whose gradient exceeds `clear` times the noise (Q, 3).
 
-    The noise is that of the median voxel, which lies in the void; where it hides the structure, the
-    tenth of the voxels with the largest gradients is taken."""
+    The noise is that of the median voxel, which lies in the void. A quarter of the strong gradients
+    is enough: in a texture, which has no void, most voxels take part."""
     lines = [np.arange(stride // 2, n, stride, dtype=float) for n in coefficients.shape]
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     length = np.linalg.norm(spline_value_gradient(coefficients, points)[1], axis=1)
-    noise = np.median(length) / MAXWELL_MEDIAN
-    found = points[length > min(clear * noise, np.quantile(length, 1 - LEAST_SHARE))]
-    if len(found) == 0:
+    noise, strong = np.median(length) / MAXWELL_MEDIAN, np.percentile(length, STRONG)
+    if strong <= BLANK * np.abs(coefficients).max():
         raise CorrelationError(
-            f"none of {len(points)} voxels has a gradient above the others': the reference is "
-            "blank; check the scan, or leave freeform out of meso.candidates"
+            f"the gradient of the reference is at most {strong:.1e} grey level a voxel at {STRONG} % "
+            "of its voxels: it is blank; check the scan, or leave freeform out of meso.candidates"
         )
-    return found
+    return points[length > min(clear * noise, CLEARLY * strong)]
 
 
 def linearise(
@@ -214,7 +217,7 @@ def register_level(
         if history[-1] < options.tolerance:
             break
     r, _, inside = linearise(sampling, deformed, u)
-    converged = bool(history[-1] < options.tolerance)
+    converged = bool(history[-1] < options.settled)
     seconds = time.perf_counter() - start
     statistics = residual_statistics(r, inside, sampling.weight)
     return Solution(coefficients, history, converged, seconds, statistics)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
+
 @dataclass(frozen=True)
 class SplineGrid:
     """Cells of `spacing` voxels from `origin` (3,), `cells` of them along each axis."""
