@@ -13,10 +13,10 @@ from addvc.correlation.spline_grid import (
     spline_points,
 )
 from addvc.correlation.spline_stencil import (
+    add_scalar,
     bending,
     conjugate_gradient,
     gram,
-    plus,
     scalar_product,
     scatter_dyads,
     stencil_product,
@@ -196,7 +196,8 @@ def test_bending_energy_of_a_quadratic_field(axes):
 
 
 def test_conjugate_gradients_solve_to_the_accuracy_asked(stencil, rng):
-    system = plus(stencil[0], bending(GRID), 30.0)
+    system = stencil[0]
+    add_scalar(system, bending(GRID), 30.0)
     b = rng.normal(size=(*GRID.shape, 3))
     for accuracy in (1e-2, 1e-8):
         x, steps = conjugate_gradient(system, b, accuracy, 3000)
@@ -206,6 +207,7 @@ def test_conjugate_gradients_solve_to_the_accuracy_asked(stencil, rng):
 
 
 def test_nothing_to_solve_takes_no_step(stencil):
-    system = plus(stencil[0], bending(GRID), 30.0)
+    system = stencil[0]
+    add_scalar(system, bending(GRID), 30.0)
     x, steps = conjugate_gradient(system, np.zeros((*GRID.shape, 3)), 1e-2, 10)
     assert steps == 0 and not x.any()

@@ -27,9 +27,9 @@ from addvc.correlation.spline_grid import (
     sum_basis,
 )
 from addvc.correlation.spline_stencil import (
+    add_scalar,
     bending,
     conjugate_gradient,
-    plus,
     scalar_product,
     scatter_dyads,
     stencil_product,
@@ -128,15 +128,19 @@ def clear_points(coefficients: np.ndarray, stride: int, clear: float) -> np.ndar
     The noise is that of the median voxel, which lies in the void. A quarter of the strong gradients
     is enough: in a texture, which has no void, most voxels take part."""
     lines = [np.arange(stride // 2, n, stride, dtype=float) for n in coefficients.shape]
-    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
-    length = np.linalg.norm(spline_value_gradient(coefficients, points)[1], axis=1)
+    plane = np.stack(np.meshgrid(*lines[1:], indexing="ij"), axis=-1).reshape(-1, 2)
+    length = np.empty((len(lines[0]), len(plane)), np.float32)
+    for i, x in enumerate(lines[0]):  # plane by plane: all points at once would take gigabytes
+        points = np.column_stack([np.full(len(plane), x), plane])
+        length[i] = np.linalg.norm(spline_value_gradient(coefficients, points)[1], axis=1)
     noise, strong = np.median(length) / MAXWELL_MEDIAN, np.percentile(length, STRONG)
     if strong <= BLANK * np.abs(coefficients).max():
         raise CorrelationError(
             f"the gradient of the reference is at most {strong:.1e} grey level a voxel at {STRONG} % "
             "of its voxels: it is blank; check the scan, or leave freeform out of meso.candidates"
         )
-    return points[length > min(clear * noise, CLEARLY * strong)]
+    i, j = np.nonzero(length > min(clear * noise, CLEARLY * strong))
+    return np.column_stack([lines[0][i], plane[j]])
 
 
 def linearise(
@@ -208,7 +212,8 @@ def register_level(
         if weight is None:
             weight = bending_weight(grid, h, energy, level.cutoff, options.axis)
         b = right_hand_side(sampling, r, slope) - weight * scalar_product(energy, coefficients)
-        step, _ = conjugate_gradient(plus(h, energy, weight), b, level.accuracy, level.most)
+        add_scalar(h, energy, weight)
+        step, _ = conjugate_gradient(h, b, level.accuracy, level.most)
         du = sampling.displacement(step)
         history.append(rms(du))
         if not np.isfinite(history[-1]):

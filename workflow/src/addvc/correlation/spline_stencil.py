@@ -158,12 +158,10 @@ def bending(grid: SplineGrid) -> np.ndarray:
     return total / grid.spacing
 
 
-def plus(stencil: np.ndarray, scalar: np.ndarray, weight: float) -> np.ndarray:
-    """stencil + weight * scalar on each component."""
-    out = stencil.copy()
+def add_scalar(stencil: np.ndarray, scalar: np.ndarray, weight: float) -> None:
+    """stencil += weight * scalar on each component, in place: it is the largest array there is."""
     for m in DIAGONAL:
-        out[..., m] += weight * scalar
-    return out
+        stencil[..., m] += weight * scalar
 
 
 def block_jacobi(stencil: np.ndarray):
