@@ -36,7 +36,7 @@ def court(mesh, images):
 
 
 def moved(mesh):
-    return np.zeros_like(mesh.points) + SHIFT
+    return np.zeros_like(mesh.points) + np.array(SHIFT)
 
 
 def test_energy_of_small_strains_is_that_of_the_stiffness(mesh, rng):
@@ -84,7 +84,7 @@ def test_of_two_that_fit_alike_the_one_with_less_energy_wins(mesh, court, images
 
 
 def test_a_lost_point_costs_its_scale_and_no_more(mesh, court, images):
-    far = np.zeros_like(mesh.points) + [500.0, 0, 0]
+    far = np.zeros_like(mesh.points) + np.array([500.0, 0, 0])
     found = judged(court, images[1], far)
     assert found["outside"] == len(court.reference.quadrature)
     assert found["score"] == pytest.approx(court.scale**2)

@@ -73,7 +73,7 @@ def judged(judge: Judge, deformed: np.ndarray, u: np.ndarray) -> dict:
         "outside": statistics["outside"],
         "robust_std": float(np.sqrt(fit)),
         "elastic_strain": float(np.sqrt(energy / volume)),
-        "score": fit + judge.weight * energy / float(w.sum()),
+        "score": float(fit + judge.weight * energy / w.sum()),
     }
 
 
