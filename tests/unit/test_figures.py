@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from addvc.correlation.gauss_newton import Solution
-from addvc.correlation.store import save_solution
+from addvc.correlation.store import save_field, save_solution
 from addvc.fem.io import write_vtu
 from addvc.fem.mesh import boundary_faces
 from addvc.images.files import write_json
 from addvc.images.scans_store import save_volume
-from addvc.report import curves, meso, scene, style, surfaces, tables, ultimate
+from addvc.report import curves, meso, scene, starts, style, surfaces, tables, ultimate
 from addvc.report.case import Case, UndeclaredInput
 
 DESCRIPTION = {"labels": {1: "3.4 %", 2: "5.2 %"}, "meso": ["meso9"], "micro": ["micro"]}
@@ -214,6 +214,28 @@ def test_ultimate_error_is_drawn_beside_what_was_expected(case, folder, tmp_path
     assert bias.get_lines()[0].get_ydata() == pytest.approx([0.1, 0.1])  # 1e-3 voxels
     assert clean.get_lines()[0].get_ydata() == pytest.approx([1, 1])
     assert [line.get_ydata()[0] for line in noisy.get_lines()[1::2]] == [2, 2]
+
+
+def test_starts_that_were_tried_are_a_row_each(case, folder, cube, tmp_path):
+    coarse = [
+        {"candidate": "zero", "residual_std": 2.5, "outside": 3, "factors": [1.0, 0.9, 1.0]},
+        {"candidate": "freeform", "residual_std": 1.5, "outside": 0, "factors": [1.0, 1.0, 1.0]},
+    ]
+    fine = [{"candidate": "meso9", "residual_std": 1.0, "outside": 0, "robust_std": 0.9,
+             "elastic_strain": 0.01, "score": 1.25}]  # fmt: skip
+    for state in (1, 2):
+        path = folder / f"dvc/start_state{state}.h5"
+        save_field(path, cube.points, best="freeform", candidates=coarse)
+        path = folder / f"dvc/micro_start_state{state}.h5"
+        save_field(path, cube.points, best="meso9", candidates=fine)
+    starts.starts(case, [tmp_path / "starts.csv"])
+    with (tmp_path / "starts.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["Start of"] for row in rows] == ["meso9", "meso9", "micro"] * 2
+    assert [row["Taken"] for row in rows[:3]] == ["no", "yes", "yes"]
+    assert rows[0]["Scale factors along x, y, z (Eq. 6)"] == "1.000 / 0.900 / 1.000"
+    assert rows[0]["Score (grey levels²)"] == "–"
+    assert rows[2]["Score (grey levels²)"] == "1.250"
 
 
 def test_acquisition_has_units_in_its_header(case, folder, tmp_path):

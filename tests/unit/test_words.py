@@ -45,6 +45,7 @@ def state(number, verdict, **micro):
         "label": f"{number}.4 %",
         "strain": 0.011 * number,
         "start": "zero",
+        "micro_start": "freeform",
         "candidates": [],
         "verdict": verdict,
         "meso12": found(error=micro.get("error", ERROR)),

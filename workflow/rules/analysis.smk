@@ -57,10 +57,10 @@ if HAS_TRUTH:
     rule truth_error:
         input:
             mesh=f"{R}/geometry/micro.vtu",
-            fields=on_micro(RESULTS),
+            fields=on_micro(JUDGED),
             truth=TRUTH,
         output:
-            of_state("analysis/error_{mesh}_state{state}.json", RESULTS),
+            of_state("analysis/error_{mesh}_state{state}.json", JUDGED),
         log:
             f"{R}/logs/truth_error/state{{state}}.log",
         benchmark:
@@ -240,7 +240,11 @@ rule summary:
         f"{R}/geometry/threshold.json",
         expand(f"{R}/geometry/{{mesh}}.json", mesh=[*MESO, "micro"]),
         expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
-        expand(f"{R}/dvc/start_state{{state}}.h5", state=STATES),
+        expand(
+            f"{R}/dvc/{{name}}_state{{state}}.h5",
+            name=["start", "micro_start", *FREEFORM],
+            state=STATES,
+        ),
         expand(
             f"{R}/dvc/{{mesh}}_state{{state}}.h5", mesh=[*MESO, *MICRO], state=STATES
         ),
@@ -256,7 +260,7 @@ rule summary:
         ),
         expand(
             f"{R}/analysis/error_{{mesh}}_state{{state}}.json",
-            mesh=[*MESO, *MICRO],
+            mesh=JUDGED,
             state=STATES,
         )
         if HAS_TRUTH

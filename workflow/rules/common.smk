@@ -52,6 +52,8 @@ FINEST = MESO[-1]
 METHODS = settings.micro_names(config)
 MICRO = list(METHODS)
 RESULTS = [*MESO, *MICRO]  # all that is measured on, coarse to fine
+FREEFORM = ["freeform"] if "freeform" in config["meso"]["candidates"] else []
+JUDGED = [*MESO, *FREEFORM, *MICRO]  # all that a truth, where known, is compared with
 TRUTH = settings.truth_file(config) if KIND == "scans" else None
 if KIND == "virtual":
     TRUTH = f"{R}/truth/virtual.json"
@@ -71,7 +73,8 @@ wildcard_constraints:
     mesh="|".join(MESO + MICRO),
     meso="|".join(MESO),
     micro="|".join(MICRO),
-    candidate="zero|platens",
+    candidate="zero|platens|freeform",
+    target=f"micro|{MESO[0]}",
 
 
 def code(script):
@@ -112,6 +115,14 @@ def mesh_of_candidate(wildcards):
     """`zero` starts on the coarsest mesh, `platens` on the grid."""
     name = "grid" if wildcards.candidate == "platens" else MESO[0]
     return f"{R}/geometry/{name}.vtu"
+
+
+def candidate_start(wildcards):
+    """What is rescaled: the free-form displacement is on the coarsest mesh already."""
+    name = f"start-{wildcards.candidate}"
+    if wildcards.candidate == "freeform":
+        name = f"freeform_on_{MESO[0]}"
+    return f"{R}/dvc/{name}_state{wildcards.state}.h5"
 
 
 def coarser(wildcards):

@@ -507,16 +507,44 @@ if STATES:
             "../scripts/figures/more_convergence.py"
 
 
+if STATES:
+
+    rule more_starts:
+        input:
+            expand(
+                f"{R}/dvc/{{name}}_state{{state}}.h5",
+                name=["start", "micro_start"],
+                state=STATES,
+            ),
+        output:
+            shown("more_starts.csv", "more_starts", "Tables", "starts that were tried"),
+        log:
+            f"{R}/logs/figures/more_starts.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_starts.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=5,
+        params:
+            code=code("figures/more_starts.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_starts.py"
+
+
 if STATES and HAS_TRUTH:
 
     rule more_error:
         input:
             smooth(0),
-            solutions(*MESO, *MICRO),
+            solutions(*JUDGED),
             fields(*MICRO),
             expand(
                 f"{R}/analysis/error_{{mesh}}_state{{state}}.json",
-                mesh=[*MESO, *MICRO],
+                mesh=JUDGED,
                 state=STATES,
             ),
         output:
@@ -535,6 +563,7 @@ if STATES and HAS_TRUTH:
         params:
             code=code("figures/more_error.py"),
             case=FIGURE_CASE,
+            names=JUDGED,
         script:
             "../scripts/figures/more_error.py"
 

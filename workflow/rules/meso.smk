@@ -14,6 +14,8 @@ rule start:
         f"{R}/logs/start/{{candidate}}_state{{state}}.log",
     benchmark:
         f"{R}/benchmarks/start/{{candidate}}_state{{state}}.tsv"
+    wildcard_constraints:
+        candidate="zero|platens",
     conda:
         ENV
     threads: 1
@@ -28,11 +30,58 @@ rule start:
         "../scripts/meso/start.py"
 
 
+rule freeform:
+    input:
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        cell_size=f"{R}/geometry/cell_size.json",
+    output:
+        f"{R}/dvc/freeform_state{{state}}.h5",
+    log:
+        f"{R}/logs/freeform/state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/freeform/state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 20.0),
+        runtime=60,
+    params:
+        code=code("meso/freeform.py"),
+        freeform=config["freeform"],
+        axis=AXIS,
+    script:
+        "../scripts/meso/freeform.py"
+
+
+rule freeform_on:
+    input:
+        mesh=f"{R}/geometry/{{target}}.vtu",
+        solution=f"{R}/dvc/freeform_state{{state}}.h5",
+    output:
+        f"{R}/dvc/freeform_on_{{target}}_state{{state}}.h5",
+    log:
+        f"{R}/logs/freeform_on/{{target}}_state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/freeform_on/{{target}}_state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 10.0),
+        runtime=10,
+    params:
+        code=code("meso/freeform_on.py"),
+    script:
+        "../scripts/meso/freeform_on.py"
+
+
 rule rescale:
     input:
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
-        start=f"{R}/dvc/start-{{candidate}}_state{{state}}.h5",
+        start=candidate_start,
         grid=f"{R}/geometry/grid.vtu",
         lines=f"{R}/geometry/grid.json",
         mesh=f"{R}/geometry/{MESO[0]}.vtu",

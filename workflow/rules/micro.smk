@@ -24,6 +24,47 @@ rule transfer:
         "../scripts/micro/transfer.py"
 
 
+rule micro_start:
+    input:
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        threshold=f"{R}/geometry/threshold.json",
+        cell_size=f"{R}/geometry/cell_size.json",
+        candidates=on_micro([FINEST, *FREEFORM]),
+    output:
+        f"{R}/dvc/micro_start_state{{state}}.h5",
+    log:
+        f"{R}/logs/micro_start/state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/micro_start/state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1200, 10.0),
+        runtime=10,
+    params:
+        code=code("micro/micro_start.py"),
+        names=[FINEST, *FREEFORM],
+        micro=section(
+            "micro",
+            "l_k",
+            "l_l",
+            "l_e",
+            "period",
+            "nu",
+            "tolerance",
+            "max_iterations",
+            "robust",
+            "rotated",
+            "stages",
+        ),
+        axis=AXIS,
+    script:
+        "../scripts/micro/micro_start.py"
+
+
 rule shell:
     input:
         mesh=f"{R}/geometry/micro.vtu",
@@ -83,7 +124,7 @@ rule micro_dvc:
         deformed=f"{R}/volumes/smooth{{state}}.h5",
         threshold=f"{R}/geometry/threshold.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
-        start=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
+        start=f"{R}/dvc/micro_start_state{{state}}.h5",
     output:
         f"{R}/dvc/{{micro}}_state{{state}}.h5",
     log:

@@ -6,4 +6,4 @@ from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)
-    errors(case, snakemake.output)
+    errors(case, snakemake.output, snakemake.params.names)

@@ -9,7 +9,7 @@ import numpy as np
 
 from addvc import __version__
 from addvc.analysis.validity import verdict
-from addvc.correlation.store import load_solution
+from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_vtu
 from addvc.images.files import read_json
 
@@ -91,10 +91,14 @@ def state_figures(
     strain = shortening(points[trusted, axis], point["displacement"][trusted, axis])
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
+    micro_notes = load_notes(folder / f"dvc/micro_start_state{state}.h5")
     return result | {
         "strain": strain,
         "start": notes["best"],
         "candidates": notes["candidates"],
+        "micro_start": micro_notes["best"],
+        "micro_candidates": micro_notes["candidates"],
+        "freeform": freeform_figures(folder, state, truth),
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
     }
@@ -115,6 +119,23 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
         "valid_nodes": float(point["valid"].mean()),
         "seconds": solution.seconds,
         "error": read_json(folder / f"analysis/error_{name}.json") if truth else None,
+    }
+
+
+def freeform_figures(folder: Path, state: int, truth: bool) -> dict | None:
+    """Convergence and, with a truth, the error of the free-form start; None where there is none."""
+    path = folder / f"dvc/freeform_state{state}.h5"
+    if not path.exists():
+        return None
+    solution, notes = load_solution(path)
+    error = folder / f"analysis/error_freeform_state{state}.json"
+    return {
+        "converged": solution.converged,
+        "iterations": solution.iterations,
+        "last_step": solution.history[-1],
+        "levels": notes["levels"],
+        "seconds": solution.seconds,
+        "error": read_json(error) if truth else None,
     }
 
 

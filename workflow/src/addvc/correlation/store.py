@@ -56,6 +56,12 @@ def load_field(path: str | Path) -> np.ndarray:
         return file["u"][:]
 
 
+def load_notes(path: str | Path) -> dict:
+    """What was noted with a field or a solution."""
+    with h5py.File(path) as file:
+        return json.loads(file.attrs["notes"])
+
+
 def save_factor(
     path: str | Path, factor: Factor, regularisation: sparse.csr_matrix, weights: dict
 ) -> None:

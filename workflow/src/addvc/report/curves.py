@@ -1,6 +1,6 @@
 """Fig. 4 and 12, and beyond the paper: convergence of every mesh, errors against a truth."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -134,9 +134,10 @@ def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
         ax.plot(steps[-1:], solution.history[-1:], "x", color=style.RED, ms=7, mew=2, zorder=4)
 
 
-def errors(case: Case, outputs: Iterable[str]) -> None:
-    """Error against the truth at the micro nodes: rms with p95, and its parts at each strut."""
-    names = [*case.meso, *case.micro]
+def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:
+    """Error against the truth at the micro nodes: rms with p95, and its parts at each strut.
+
+    names: results in the order they are drawn, the free-form start among them."""
     fig, axes = _error_panels(case, names)
     for place, name in enumerate(names):
         for column, state in enumerate(case.states):
@@ -156,7 +157,7 @@ def errors(case: Case, outputs: Iterable[str]) -> None:
     style.save(fig, outputs)
 
 
-def _error_panels(case: Case, names: list[str]) -> tuple:
+def _error_panels(case: Case, names: Sequence[str]) -> tuple:
     """The figure and its empty panels, logarithmic, a tick a state; the second where the truth knows
     the direction of the struts."""
     known = [

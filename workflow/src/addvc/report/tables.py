@@ -124,8 +124,15 @@ def _micro(case: Case, config: dict, method: str) -> dict[str, str]:
     return {
         "Matching functional": functional,
         "Regularisation length (voxels)": lengths,
-        "Initialisation": f"solution of {case.finest}",
+        "Initialisation": _micro_start(case, config),
     }
+
+
+def _micro_start(case: Case, config: dict) -> str:
+    """The starts that micro DVC chooses from."""
+    if "freeform" not in config["meso"]["candidates"]:
+        return f"solution of {case.finest}"
+    return f"solution of {case.finest} or free-form, by state (more_starts.csv)"
 
 
 def _ultimate(case: Case, name: str, key: str) -> str:

@@ -195,7 +195,7 @@ def convergence_table(summary: dict) -> list[str]:
     rows = [
         [
             state["label"],
-            state["start"],
+            state["micro_start" if mesh.startswith("micro") else "start"],
             mesh,
             str(state[mesh]["iterations"]),
             figure(state[mesh]["last_step"], ".1e"),

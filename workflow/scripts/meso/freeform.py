@@ -1,0 +1,18 @@
+"""Free-form DVC of one state: a cubic B-spline grid, coarse to fine, from rest."""
+
+from dataclasses import asdict, replace
+
+from addvc.correlation.freeform import freeform, freeform_options
+from addvc.correlation.store import save_solution
+from addvc.images.files import read_json
+from addvc.images.scans_store import load_volume
+from addvc.runtime import job
+
+with job(snakemake):
+    source, params = snakemake.input, snakemake.params
+    cell = read_json(source.cell_size)["cell_size"]
+    options = freeform_options(params.freeform, cell, params.axis)
+    images = (load_volume(path)[0] for path in (source.reference, source.deformed))
+    grid, solution, levels = freeform(*images, options)
+    flat = replace(solution, u=solution.u.reshape(-1, 3))
+    save_solution(snakemake.output[0], flat, grid=asdict(grid), levels=levels)

@@ -1,0 +1,42 @@
+"""Beyond the paper: every start that was tried, for the meso and for the micro correlation."""
+
+from collections.abc import Iterable
+
+from addvc.correlation.store import load_notes
+from addvc.report.case import Case
+from addvc.report.tables import write_table
+
+FIGURES = {
+    "residual_std": ("σ(r) (grey levels)", "{:.3f}"),
+    "outside": ("Points outside of the image", "{:d}"),
+    "factors": ("Scale factors along x, y, z (Eq. 6)", "{}"),
+    "robust_std": ("Robust residual (grey levels)", "{:.3f}"),
+    "elastic_strain": ("Elastic strain, rms (–)", "{:.4f}"),
+    "score": ("Score (grey levels²)", "{:.3f}"),
+}
+
+
+def starts(case: Case, outputs: Iterable[str]) -> None:
+    """A row for each candidate of each state: first for the coarsest mesh, then for micro DVC."""
+    rows = [["State", "Start of", "Candidate", "Taken", *(name for name, _ in FIGURES.values())]]
+    for state in case.states:
+        for result, file in ((case.meso[0], "start"), ("micro", "micro_start")):
+            notes = load_notes(case.path(f"dvc/{file}_state{state}.h5"))
+            rows += [
+                [case.labels[state], result, *_row(one, notes["best"])]
+                for one in notes["candidates"]
+            ]
+    for path in outputs:
+        write_table(path, rows)
+
+
+def _row(candidate: dict, best: str) -> list[str]:
+    """Name, whether it was taken, and what was measured of it."""
+    name = candidate["candidate"]
+    values = []
+    for key, (_, form) in FIGURES.items():
+        value = candidate.get(key)
+        if isinstance(value, list):
+            value = " / ".join(f"{one:.3f}" for one in value)
+        values.append("–" if value is None else form.format(value))
+    return [name, "yes" if name == best else "no", *values]
