@@ -120,7 +120,7 @@ def mechanics(
     if known.any():
         good = [fit for fit, use in zip(fits, known, strict=True) if use]
         variances = prior_variances(
-            np.array([fit.coefficients for fit in good]), np.array([fit.covariance for fit in good])
+            np.array([fit.coefficients for fit in good]), np.array([fit.noise for fit in good])
         )
     rows = [row(strut, fit, nu, variances) for strut, fit in zip(struts, fits, strict=True)]
     return {name: [values[name] for values in rows] for name in MECHANICS}
