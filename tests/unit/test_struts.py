@@ -33,6 +33,10 @@ from addvc.analysis.struts_truth import BEAMS, FIELD, judged, unloaded
 from addvc.errors import GeometryError
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.skeleton import FREE_END, Branch, kinks, simplified, strut_graph
+from addvc.images.files import write_json
+from addvc.report.case import Case
+from addvc.report.struts import trusted, tubes
+from addvc.report.struts_truth import truth_rows
 
 NU, LENGTH, RADIUS = 0.3, 9.0, 1.1
 TURN = Rotation.from_rotvec([0.9, -1.7, 0.6])
@@ -508,3 +512,42 @@ def test_struts_without_a_load_are_not_compared():
     energies = np.array([[1.0, 1, 1], [1e-6, 1e-6, 0], [2, 0, 0]])
     columns = {kind + BEAMS: values for kind, values in zip(KINDS, energies.T, strict=True)}
     assert_array_equal(unloaded(columns, BEAMS, np.ones(3)), [False, True, False])
+
+
+# ------------------------------------------------------------------------------- the figures
+
+
+def test_tubes_hold_every_strut_between_its_junctions(cut):
+    struts, graph = cut
+    points, faces, owner = tubes(struts, graph.junctions)
+    assert set(owner) == {FREE_END, *range(len(struts))}
+    assert faces.max() == len(points) - 1
+    first = np.unique(faces[owner == 0])
+    away = points[first] - struts[0].middle
+    along = away @ struts[0].direction
+    across = np.linalg.norm(away - np.outer(along, struts[0].direction), axis=1)
+    assert_allclose(np.ptp(along), struts[0].length, atol=0.5)
+    assert_allclose(across.max(), struts[0].radius, rtol=0.2)
+
+
+def test_the_strut_of_a_figure_is_trusted_only_where_all_results_know_it():
+    table = table_of([[1, 1, 1], [2, 1, 1], [3, 1, 1]], valid=[1, 1, 0])
+    table["bending_share_field"] = np.array([np.nan, 0.5, 0.5])
+    sources = {"micro": ("", "k"), "truth": ("_field", "k")}
+    assert_array_equal(trusted(table, sources), [False, True, False])
+
+
+def test_figures_against_the_truth_become_rows_with_units(tmp_path):
+    table = table_of(np.random.default_rng(2417).random((30, 3)))
+    names = (*KINDS, "bending_share", "axial_strain", "bending_share_std")
+    true = {name + FIELD: table[name] for name in names}
+    for state in (1, 2):
+        write_json(tmp_path / f"analysis/struts_truth_state{state}.json",
+                   judged(table, true, {"micro": "", "meso9": ""}))  # fmt: skip
+    labels = {1: "3.4 %", 2: "5.2 %"}
+    case = Case.of({"root": tmp_path, "labels": labels, "meso": ["meso9"], "micro": ["micro"]})
+    rows = truth_rows(case)
+    assert {len(row) for row in rows} == {6}
+    assert rows[0][4:] == ["3.4 %", "5.2 %"]
+    found = next(row for row in rows if row[2] == "correlation of the share of bending")
+    assert found[4:] == ["1", "1"]
