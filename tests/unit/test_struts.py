@@ -30,7 +30,6 @@ from addvc.analysis.strut_table import (
 )
 from addvc.analysis.struts import Strut, partition
 from addvc.analysis.struts_truth import BEAMS, FIELD, judged, unloaded
-from addvc.errors import GeometryError
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.skeleton import FREE_END, Branch, kinks, simplified, strut_graph
 from addvc.images.files import write_json
@@ -361,11 +360,27 @@ def test_neighbours_share_a_junction(cut, lattice):
     assert {len(others) for others in near} <= {4, 5, 6, 7, 8, 9, 10}
 
 
-def test_a_bar_alone_has_no_junction():
+def test_a_bar_alone_has_no_junction(caplog):
     solid = np.zeros((9, 9, 20), bool)
     solid[3:6, 3:6, 2:18] = True
-    with pytest.raises(GeometryError, match="no junction"):
-        strut_graph(solid)
+    with caplog.at_level("WARNING"):
+        graph = strut_graph(solid)
+    assert "no junction" in caplog.text
+    assert len(graph.branches) == 0
+    assert partition(solid_mesh(solid), graph, np.zeros(solid.shape)) == []
+
+
+def test_no_struts_are_a_table_too(tmp_path):
+    points = np.zeros((4, 3))
+    table = table_under([], points, points)
+    save_partition(tmp_path / "struts.h5", [], np.zeros((0, 3)))
+    assert load_partition(tmp_path / "struts.h5")[0] == []
+    write_columns(tmp_path / "table.csv", table)
+    back = read_columns(tmp_path / "table.csv")
+    assert set(back) == set(described([""]))
+    assert foam(back)["valid"] == 0
+    true = {name + FIELD: np.zeros(0) for name in (*KINDS, "bending_share", "axial_strain")}
+    assert judged(back, true, {"micro": ""})["micro"]["field"]["struts"] == 0
 
 
 def test_a_stub_is_no_strut_and_leaves_one_strut_behind():

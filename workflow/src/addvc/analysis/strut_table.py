@@ -81,13 +81,15 @@ def strut_table(
 
 def geometry(struts: list[Strut]) -> dict[str, list]:
     """The columns that do not depend on the displacement, but for `valid`."""
+    names = [name for name in GEOMETRY if name != "valid"]
+    if not struts:
+        return {name: [] for name in names}
     rows = []
     for number, (strut, near) in enumerate(zip(struts, neighbours(struts), strict=True)):
         others = " ".join(str(n) for n in near if n != number)
         whole = int(strut.whole and not strut.broken)
         values = [*strut.middle, float(strut.length), strut.radius, *strut.direction, whole]
         rows.append([*values, *strut.ends, others])
-    names = [name for name in GEOMETRY if name != "valid"]
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
