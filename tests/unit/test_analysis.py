@@ -6,7 +6,7 @@ import pytest
 from addvc.analysis.fields import by_owner, result_fields
 from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_residual
 from addvc.analysis.summary import costs
-from addvc.analysis.truth import error_at, error_statistics, load_truth
+from addvc.analysis.truth import error_statistics, errors_at, load_truth
 from addvc.analysis.validity import nodal_residual, residual_limit, valid_nodes, verdict
 from addvc.correlation.metric import Reference
 from addvc.fem.mesh import Mesh
@@ -189,7 +189,7 @@ def test_error_against_the_truth_of_a_virtual_test(tmp_path, rng):
     field.save(tmp_path / "virtual.json")
     points = 60 * rng.random((50, 3))
     u = field.displacement(points, 2) + np.array([0, 0.3, 0.4])
-    found = error_at(load_truth(tmp_path / "virtual.json"), points, u, 2)
+    (found,) = errors_at(load_truth(tmp_path / "virtual.json"), points, [u], 2)
     assert found["rms"] == pytest.approx(0.5) and found["p95"] == pytest.approx(0.5)
     assert found["rms_normal"] is None
 

@@ -1,7 +1,9 @@
 """The configuration: what it may say, what it means, and the words for what it may not."""
 
+from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from jsonschema import Draft202012Validator
@@ -9,6 +11,8 @@ from jsonschema import Draft202012Validator
 from addvc import config as settings
 from addvc import reference
 from addvc.errors import ConfigError
+from addvc.twin import SIZES, TwinOptions
+from addvc.twin.options import DTYPES, MATERIALS
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = yaml.safe_load(reference.SCHEMA.read_text())
@@ -211,6 +215,42 @@ def test_a_key_is_described_and_its_default_is_allowed(path):
     if "default" in spec:
         errors = Draft202012Validator(spec).iter_errors(spec["default"])
         assert [error.message for error in errors] == []
+
+
+TWIN = SCHEMA["properties"]["twin"]["properties"]
+
+
+def test_keys_and_defaults_of_the_twin_are_those_of_its_options():
+    """`porosity` is a key of its own, since real scans have one too."""
+    options = {f.name: f.default for f in fields(TwinOptions)}
+    assert set(TWIN) == set(options) - {"porosity"}
+    for key, spec in TWIN.items():
+        assert spec["default"] == np.asarray(options[key]).tolist(), key
+    assert SCHEMA["properties"]["porosity"]["default"] == options["porosity"]
+
+
+def test_choices_of_the_twin_are_those_of_its_code():
+    for key, known in (("size", SIZES), ("material", MATERIALS), ("dtype", DTYPES)):
+        assert TWIN[key]["enum"] == list(known)
+    shapes = [" x ".join(map(str, shape)) for shape in SIZES.values()]
+    assert all(shape in TWIN["size"]["description"] for shape in shapes)
+
+
+def test_a_twin_is_kept_by_what_makes_it():
+    """Another noise, another scan of the same motion; another seed, another motion."""
+    whole = {key: spec["default"] for key, spec in TWIN.items()}
+
+    def folders(**changes):
+        parts = settings.twin_parts({"twin": whole | changes, "porosity": 0.96})
+        return [settings.twin_folder(part) for part in parts]
+
+    motion, scans = folders()
+    assert set(settings.IMAGING) < set(TWIN)
+    for key in settings.IMAGING:
+        assert folders(**{key: 2})[0] == motion and folders(**{key: 2})[1] != scans
+    for key in set(TWIN) - set(settings.IMAGING):
+        other = folders(**{key: "other"})
+        assert other[0] != motion and other[1] != scans
 
 
 def test_every_name_that_designers_were_promised_is_there():

@@ -13,7 +13,7 @@ from addvc.fem.io import write_vtu
 from addvc.fem.mesh import boundary_faces
 from addvc.images.files import write_json
 from addvc.images.scans_store import save_volume
-from addvc.report import curves, meso, scene, style, surfaces, tables
+from addvc.report import curves, meso, scene, style, surfaces, tables, ultimate
 from addvc.report.case import Case, UndeclaredInput
 
 DESCRIPTION = {"labels": {1: "3.4 %", 2: "5.2 %"}, "meso": ["meso9"], "micro": ["micro"]}
@@ -196,6 +196,24 @@ def test_figures_of_a_case_with_a_failed_state_are_drawn(case, tmp_path):
         page = np.array([style.HEIGHT, style.WIDTH]) * style.INCH * style.DPI
         assert (image.shape[:2] <= 1.03 * page).all()
         assert 0.001 < (image[..., :3].min(axis=-1) < 0.9).mean() < 0.9
+
+
+def test_ultimate_error_is_drawn_beside_what_was_expected(case, folder, tmp_path, monkeypatch):
+    rows = [{"shift": s, "bias": 1e-4, "std": 1e-3} for s in (0.5, 0.25)]
+    found = {"shifts": rows, "noisy_shifts": rows, "a_priori": 2e-3}
+    for name in ("meso9", "micro"):
+        write_json(folder / f"analysis/ultimate_{name}.json", found)
+    kept, save = [], style.save
+    monkeypatch.setattr(style, "save", lambda fig, out: (kept.append(fig), save(fig, out)))
+    ultimate.ultimate(case, [tmp_path / "ultimate.png"])
+    bias, clean, noisy = kept[0].axes
+    for ax in kept[0].axes:
+        assert ax.get_xlabel().endswith("(voxels)") and ax.get_ylabel().endswith("voxels)")
+        assert list(ax.get_lines()[0].get_xdata()) == [0.25, 0.5]
+    assert [text.get_text() for text in kept[0].legends[0].get_texts()][:2] == ["meso9", "micro"]
+    assert bias.get_lines()[0].get_ydata() == pytest.approx([0.1, 0.1])  # 1e-3 voxels
+    assert clean.get_lines()[0].get_ydata() == pytest.approx([1, 1])
+    assert [line.get_ydata()[0] for line in noisy.get_lines()[1::2]] == [2, 2]
 
 
 def test_acquisition_has_units_in_its_header(case, folder, tmp_path):

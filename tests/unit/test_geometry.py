@@ -343,6 +343,14 @@ def test_meso_mesh_is_the_same_twice_and_well_shaped(specimen):
     assert check_mesh(first, "meso")["min_dihedral"] > 30
 
 
+@pytest.mark.parametrize("specimen", [CYLINDER, BOX], ids=["cylinder", "box"])
+def test_end_faces_of_a_meso_mesh_keep_away_from_the_platens(specimen):
+    along = meso_mesh(specimen, 7.0, margin=5.0).points[:, specimen.axis]
+    assert (along.min(), along.max()) == pytest.approx((specimen.low + 5, specimen.high - 5))
+    with pytest.raises(MeshError, match=r"meso\.margin 20 \(less than .* lower meso\.margin"):
+        meso_mesh(specimen, 7.0, margin=20.0)
+
+
 def test_a_specimen_too_small_for_a_meso_mesh_is_an_error():
     with pytest.raises(MeshError, match=r"nearest .* too small for it; give smaller meso\.sizes"):
         meso_mesh(CYLINDER, 200.0)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth, save_mesh_truth
-from addvc.analysis.truth import error_at, load_truth
+from addvc.analysis.truth import errors_at, load_truth
 from addvc.errors import ConfigError, MeshError
 from addvc.fem.elements import P2_EDGES, tet_p1, tet_p2
 from addvc.fem.mesh import Mesh
@@ -110,7 +110,7 @@ def test_distance_to_the_surface_is_positive_outside(cross):
 def test_errors_are_split_along_and_across_struts(cross):
     """A slip of 0.3 voxel along an arm, and 0.4 across it."""
     x = np.array([[5.0, 0, 0], [-6.0, 0, 0]])
-    found = error_at(cross, x, np.array([[0.3, 0.4, 0], [0.3, 0.4, 0]]), 1)
+    (found,) = errors_at(cross, x, [np.array([[0.3, 0.4, 0], [0.3, 0.4, 0]])], 1)
     assert found["rms"] == pytest.approx(0.5)
     assert found["rms_along"] == pytest.approx(0.3, abs=0.05)
     assert found["rms_normal"] == pytest.approx(0.4, abs=0.05)

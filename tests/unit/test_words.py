@@ -201,6 +201,33 @@ def test_solid_that_was_left_out_has_a_warning(kept, warned):
     assert ("15% of the segmented solid" in text and "lower mesh.size" in text) == warned
 
 
+CHECK = {"name": "residual under the truth at 3.4 %", "value": 8.125, "unit": "grey level",
+         "low": 4.69, "high": 6.2, "passed": False, "remedy": "lower twin.step"}  # fmt: skip
+
+
+@pytest.mark.parametrize("checks", [None, {"count": 20, "failed": []}])
+def test_a_twin_that_passes_its_checks_has_no_warning(checks):
+    case = summary(GOOD) | {"twin_checks": checks}
+    assert warnings(case) == ["None."]
+    assert "synthetic" not in closing_lines(case, "results/foam")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, "is 8.125 grey level (at least 4.69, at most 6.2); lower twin.step."),
+        ({"low": None, "unit": "–"}, "is 8.125 (at most 6.2); lower twin.step."),
+        ({"value": None, "high": None}, "is unknown grey level (at least 4.69); lower twin.step."),
+    ],
+)
+def test_a_check_of_the_twin_that_fails_has_a_warning(change, words):
+    case = summary(GOOD) | {"twin_checks": {"count": 20, "failed": [CHECK | change]}}
+    (text,) = warnings(case)
+    assert text.endswith(f"claims to be: {CHECK['name']} {words}")
+    assert "1 of 20 checks of the synthetic test" in closing_lines(case, "results/foam")
+    assert words in sections(front_page(case, CONFIG, SCANS))["Warnings and failures"]
+
+
 # ------------------------------------------------------------------------------ strictness
 
 

@@ -168,6 +168,13 @@ def test_the_summary_has_the_names_that_others_rely_on(summary):
 # -------------------------------------------------------------------------------- how good
 
 
+def test_the_twin_is_what_it_claims_to_be(results, summary):
+    checks = json.loads((results / "analysis/twin_check.json").read_text())["checks"]
+    assert [check for check in checks if not check["passed"]] == []
+    assert summary["twin_checks"] == {"count": len(checks), "failed": []}
+    assert len(checks) >= 8 + 3 * len(STATES)  # geometry and mechanics; then each state
+
+
 def test_the_twin_is_measured_as_it_was_made(summary):
     assert summary["case"] == "test"
     assert summary["cell_size"] == pytest.approx(28, rel=0.1)

@@ -6,14 +6,14 @@ rule residual:
         mesh=f"{R}/geometry/micro.vtu",
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
-        field=on_micro,
+        fields=on_micro(RESULTS),
     output:
-        arrays=f"{R}/analysis/residual_{{mesh}}_state{{state}}.h5",
-        statistics=f"{R}/analysis/residual_{{mesh}}_state{{state}}.json",
+        arrays=of_state("analysis/residual_{mesh}_state{state}.h5", RESULTS),
+        statistics=of_state("analysis/residual_{mesh}_state{state}.json", RESULTS),
     log:
-        f"{R}/logs/residual/{{mesh}}_state{{state}}.log",
+        f"{R}/logs/residual/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/residual/{{mesh}}_state{{state}}.tsv"
+        f"{R}/benchmarks/residual/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -28,17 +28,17 @@ rule residual:
 
 rule field:
     input:
-        mesh=mesh_of,
+        meshes=[mesh_of(name) for name in RESULTS],
         micro=f"{R}/geometry/micro.vtu",
-        solution=f"{R}/dvc/{{mesh}}_state{{state}}.h5",
-        residual=f"{R}/analysis/residual_{{mesh}}_state{{state}}.h5",
+        solutions=of_state("dvc/{mesh}_state{state}.h5", RESULTS),
+        residuals=of_state("analysis/residual_{mesh}_state{state}.h5", RESULTS),
         threshold=f"{R}/geometry/threshold.json",
     output:
-        f"{R}/fields/{{mesh}}_state{{state}}.vtu",
+        of_state("fields/{mesh}_state{state}.vtu", RESULTS),
     log:
-        f"{R}/logs/field/{{mesh}}_state{{state}}.log",
+        f"{R}/logs/field/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/field/{{mesh}}_state{{state}}.tsv"
+        f"{R}/benchmarks/field/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -56,14 +56,14 @@ if HAS_TRUTH:
     rule truth_error:
         input:
             mesh=f"{R}/geometry/micro.vtu",
-            field=on_micro,
+            fields=on_micro(RESULTS),
             truth=TRUTH,
         output:
-            f"{R}/analysis/error_{{mesh}}_state{{state}}.json",
+            of_state("analysis/error_{mesh}_state{state}.json", RESULTS),
         log:
-            f"{R}/logs/truth_error/{{mesh}}_state{{state}}.log",
+            f"{R}/logs/truth_error/state{{state}}.log",
         benchmark:
-            f"{R}/benchmarks/truth_error/{{mesh}}_state{{state}}.tsv"
+            f"{R}/benchmarks/truth_error/state{{state}}.tsv"
         conda:
             ENV
         threads: 1
@@ -184,6 +184,7 @@ rule noise_draws:
     input:
         mesh=f"{R}/geometry/micro.vtu",
         reference=f"{R}/volumes/smooth0.h5",
+        shell=f"{R}/geometry/shell.h5",
         factor=f"{R}/dvc/{MICRO[0]}_factor.h5",
         threshold=f"{R}/geometry/threshold.json",
     output:
@@ -201,6 +202,7 @@ rule noise_draws:
     params:
         code=code("analysis/noise_draws.py"),
         blur=config["images"]["blur"],
+        method=settings.micro_names(config)[MICRO[0]],
     script:
         "../scripts/analysis/noise_draws.py"
 
@@ -261,6 +263,7 @@ rule summary:
         if HAS_TRUTH
         else [],
         expand(f"{R}/struts_state{{state}}.json", state=STATES),
+        **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",
     log:

@@ -49,7 +49,9 @@ LABELS = settings.state_labels(config)
 STATES = list(LABELS)
 MESO = settings.meso_names(config)
 FINEST = MESO[-1]
-MICRO = list(settings.micro_names(config))
+METHODS = settings.micro_names(config)
+MICRO = list(METHODS)
+RESULTS = [*MESO, *MICRO]  # all that is measured on, coarse to fine
 TRUTH = settings.truth_file(config) if KIND == "scans" else None
 if KIND == "virtual":
     TRUTH = f"{R}/truth/virtual.json"
@@ -124,13 +126,22 @@ def start_of(wildcards):
     return f"{R}/dvc/{coarser(wildcards)}_state{wildcards.state}.h5"
 
 
-def on_micro(wildcards):
-    """The displacement of a result at the nodes of the micro mesh."""
-    middle = "_on_micro" if wildcards.mesh in MESO else ""
-    return f"{R}/dvc/{wildcards.mesh}{middle}_state{wildcards.state}.h5"
+def of_state(pattern, names):
+    """Files of one state, one for each name: `{mesh}` in the pattern, `{state}` left to the rule."""
+    return expand(f"{R}/{pattern}", mesh=names, state="{state}")
 
 
-def mesh_of(wildcards):
+def on_micro(names):
+    """The displacements of results at the nodes of the micro mesh, in one state."""
+    parts = [name if name in MICRO else f"{name}_on_micro" for name in names]
+    return of_state("dvc/{mesh}_state{state}.h5", parts)
+
+
+def mesh_of(name):
     """The mesh of a result: every micro method shares one."""
-    name = wildcards.mesh if wildcards.mesh in MESO else "micro"
-    return f"{R}/geometry/{name}.vtu"
+    return f"{R}/geometry/{'micro' if name in MICRO else name}.vtu"
+
+
+def method_of(wildcards):
+    """The method of a micro result."""
+    return METHODS[wildcards.micro]

@@ -225,6 +225,29 @@ rule table2:
         "../scripts/figures/table2.py"
 
 
+rule more_ultimate:
+    input:
+        expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=RESULTS),
+    output:
+        shown("more_ultimate.png", "more_ultimate", "Quality", "ultimate error"),
+        drawing("more_ultimate"),
+    log:
+        f"{R}/logs/figures/more_ultimate.log",
+    benchmark:
+        f"{R}/benchmarks/figures/more_ultimate.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 1.0),
+        runtime=5,
+    params:
+        code=code("figures/more_ultimate.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/more_ultimate.py"
+
+
 if STATES:
 
     rule fig10:

@@ -163,7 +163,7 @@ rule meso_mesh:
         runtime=60,
     params:
         code=code("geometry/meso_mesh.py"),
-        meso=section("meso", "sizes"),
+        meso=section("meso", "sizes", "margin"),
     script:
         "../scripts/geometry/meso_mesh.py"
 

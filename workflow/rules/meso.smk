@@ -117,6 +117,7 @@ rule meso_dvc:
 rule meso_ultimate_error:
     input:
         reference=f"{R}/volumes/smooth0.h5",
+        threshold=f"{R}/geometry/threshold.json",
         mesh=f"{R}/geometry/{{meso}}.vtu",
         figures=f"{R}/geometry/{{meso}}.json",
     output:
@@ -137,5 +138,6 @@ rule meso_ultimate_error:
         coarsest=lambda wildcards: wildcards.meso == MESO[0],
         axis=AXIS,
         ultimate_error=config["ultimate_error"],
+        images=section("images", "blur"),
     script:
         "../scripts/meso/ultimate_error.py"

@@ -3,15 +3,15 @@
 
 rule transfer:
     input:
-        mesh=f"{R}/geometry/{{meso}}.vtu",
+        meshes=[mesh_of(name) for name in MESO],
         micro=f"{R}/geometry/micro.vtu",
-        solution=f"{R}/dvc/{{meso}}_state{{state}}.h5",
+        solutions=of_state("dvc/{mesh}_state{state}.h5", MESO),
     output:
-        f"{R}/dvc/{{meso}}_on_micro_state{{state}}.h5",
+        on_micro(MESO),
     log:
-        f"{R}/logs/transfer/{{meso}}_state{{state}}.log",
+        f"{R}/logs/transfer/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/transfer/{{meso}}_state{{state}}.tsv"
+        f"{R}/benchmarks/transfer/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -24,9 +24,34 @@ rule transfer:
         "../scripts/micro/transfer.py"
 
 
+rule shell:
+    input:
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        threshold=f"{R}/geometry/threshold.json",
+    output:
+        f"{R}/geometry/shell.h5",
+    log:
+        f"{R}/logs/shell/all.log",
+    benchmark:
+        f"{R}/benchmarks/shell/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 40.0),
+        runtime=20,
+    params:
+        code=code("micro/shell.py"),
+        width=config["micro"]["shell"],
+    script:
+        "../scripts/micro/shell.py"
+
+
 rule factor:
     input:
         mesh=f"{R}/geometry/micro.vtu",
+        shell=f"{R}/geometry/shell.h5",
         reference=f"{R}/volumes/smooth0.h5",
         cell_size=f"{R}/geometry/cell_size.json",
     output:
@@ -43,7 +68,8 @@ rule factor:
         runtime=120,
     params:
         code=code("micro/factor.py"),
-        micro=section("micro", "l_k", "l_l", "period", "nu"),
+        method=method_of,
+        micro=section("micro", "l_k", "l_l", "l_e", "period", "nu"),
         axis=AXIS,
     script:
         "../scripts/micro/factor.py"
@@ -52,8 +78,10 @@ rule factor:
 rule micro_dvc:
     input:
         mesh=f"{R}/geometry/micro.vtu",
+        shell=f"{R}/geometry/shell.h5",
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
+        threshold=f"{R}/geometry/threshold.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
         start=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
     output:
@@ -66,11 +94,14 @@ rule micro_dvc:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1500, 3.0),
+        mem_mb=memory(2500, 10.0),
         runtime=120,
     params:
         code=code("micro/micro_dvc.py"),
-        micro=section("micro", "tolerance", "max_iterations"),
+        method=method_of,
+        micro=section(
+            "micro", "tolerance", "max_iterations", "nu", "robust", "rotated", "stages"
+        ),
     script:
         "../scripts/micro/micro_dvc.py"
 
@@ -78,7 +109,9 @@ rule micro_dvc:
 rule micro_ultimate_error:
     input:
         mesh=f"{R}/geometry/micro.vtu",
+        shell=f"{R}/geometry/shell.h5",
         reference=f"{R}/volumes/smooth0.h5",
+        threshold=f"{R}/geometry/threshold.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
     output:
         f"{R}/analysis/ultimate_{{micro}}.json",
@@ -94,6 +127,8 @@ rule micro_ultimate_error:
         runtime=60,
     params:
         code=code("micro/ultimate_error.py"),
+        method=method_of,
         ultimate_error=config["ultimate_error"],
+        images=section("images", "blur"),
     script:
         "../scripts/micro/ultimate_error.py"

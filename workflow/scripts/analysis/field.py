@@ -1,4 +1,4 @@
-"""A result as ParaView reads it: displacement, validity, strain, residual."""
+"""The results of one state as ParaView reads them: displacement, validity, strain, residual."""
 
 from addvc.analysis.fields import result_fields
 from addvc.analysis.residuals import load_residual
@@ -9,8 +9,10 @@ from addvc.runtime import job
 
 with job(snakemake):
     source = snakemake.input
-    mesh, micro = read_mesh(source.mesh), read_mesh(source.micro)
-    noise = read_json(source.threshold)["noise"]
-    u = load_field(source.solution)
-    points, cells = result_fields(mesh, u, micro, load_residual(source.residual), noise)
-    write_mesh(snakemake.output[0], mesh, points, cells)
+    micro, noise = read_mesh(source.micro), read_json(source.threshold)["noise"]
+    for path, solution, residual, result in zip(
+        source.meshes, source.solutions, source.residuals, snakemake.output, strict=True
+    ):
+        mesh = read_mesh(path)
+        u, r = load_field(solution), load_residual(residual)
+        write_mesh(result, mesh, *result_fields(mesh, u, micro, r, noise))

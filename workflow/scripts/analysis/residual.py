@@ -1,17 +1,19 @@
-"""Section 4.2.2: the residual of a result at the points of the micro quadrature."""
+"""Section 4.2.2: the residuals of one state at the points of the micro quadrature."""
 
 from addvc.analysis.residuals import residual_on, save_residual
 from addvc.correlation.micro import micro_reference
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import write_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:
-    source = snakemake.input
+    source, made = snakemake.input, snakemake.output
     reference = micro_reference(read_mesh(source.mesh), load_volume(source.reference)[0])
-    result = residual_on(reference, load_volume(source.deformed)[0], load_field(source.field))
-    log.info("%s", result["statistics"])
-    write_json(snakemake.output.statistics, result["statistics"])
-    save_residual(snakemake.output.arrays, result)
+    deformed = load_volume(source.deformed)[0]
+    for field, arrays, statistics in zip(source.fields, made.arrays, made.statistics, strict=True):
+        result = residual_on(reference, deformed, load_field(field))
+        log.info("%s: %s", field, result["statistics"])
+        write_json(statistics, result["statistics"])
+        save_residual(arrays, result)

@@ -1,6 +1,6 @@
-"""The error of a result against the known truth, at bulk nodes of the micro mesh."""
+"""The errors of one state against the known truth, at bulk nodes of the micro mesh."""
 
-from addvc.analysis.truth import error_at, load_truth
+from addvc.analysis.truth import errors_at, load_truth
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_vtu
 from addvc.images.files import write_json
@@ -9,8 +9,9 @@ from addvc.runtime import job
 with job(snakemake) as log:
     points, _, classes, _ = read_vtu(snakemake.input.mesh)
     bulk = classes["penalised"] == 0
-    u = load_field(snakemake.input.field)[bulk]
+    fields = (load_field(path)[bulk] for path in snakemake.input.fields)
     state = int(snakemake.wildcards.state)
-    result = error_at(load_truth(snakemake.input.truth), points[bulk], u, state)
-    log.info("%s", result)
-    write_json(snakemake.output[0], result)
+    found = errors_at(load_truth(snakemake.input.truth), points[bulk], fields, state)
+    for path, result in zip(snakemake.output, found, strict=True):
+        log.info("%s: %s", path, result)
+        write_json(path, result)

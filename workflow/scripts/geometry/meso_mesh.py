@@ -13,6 +13,6 @@ with job(snakemake):
     specimen = Specimen.from_dict(read_json(snakemake.input.specimen))
     cell = read_json(snakemake.input.cell_size)["cell_size"]
     size = meso_size(snakemake.config, name, cell)
-    mesh = meso_mesh(specimen, size)
+    mesh = meso_mesh(specimen, size, snakemake.params.meso["margin"])
     write_json(snakemake.output.figures, check_mesh(mesh, name) | {"wanted_edge": size})
     write_mesh(snakemake.output.mesh, mesh)

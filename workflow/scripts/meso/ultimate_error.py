@@ -1,10 +1,11 @@
 """Table 2: the ultimate error of a meso mesh, by sub-voxel shifts."""
 
 from addvc.correlation.meso import meso_options, meso_system
-from addvc.correlation.ultimate import ultimate_error
+from addvc.correlation.ultimate import STOP, ultimate_error
+from addvc.correlation.uncertainty import Noise
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json, write_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake):
@@ -14,4 +15,5 @@ with job(snakemake):
     coefficients = load_volume(source.reference)[0]
     system = meso_system(read_mesh(source.mesh), coefficients, options)
     shifts = params.ultimate_error["shifts"]
-    write_json(snakemake.output[0], ultimate_error(system, coefficients, shifts))
+    noise = Noise(read_json(source.threshold)["noise"], params.images["blur"])
+    write_json(snakemake.output[0], ultimate_error(system, coefficients, shifts, STOP, noise))

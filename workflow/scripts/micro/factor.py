@@ -1,12 +1,13 @@
-"""Eq. 10: A = H + M of the micro mesh, factorised once for all states."""
+"""Eq. 10, or with an elastic energy: A = H + M of the micro mesh, factorised once for all states."""
 
-from addvc.correlation.micro import eq10, micro_options, micro_reference
+from addvc.correlation.micro import elastic, eq10, micro_options, micro_reference, shell_of
 from addvc.correlation.store import save_factor
 from addvc.fem.io import read_vtu
 from addvc.fem.mesh import Mesh
+from addvc.fem.shell import load_quadrature
 from addvc.fem.solver import factorise
 from addvc.images.files import read_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:
@@ -14,8 +15,12 @@ with job(snakemake) as log:
     points, cells, classes, _ = read_vtu(source.mesh)
     cell = read_json(source.cell_size)["cell_size"]
     options = micro_options(params.micro, cell, params.axis)
-    reference = micro_reference(Mesh(points, cells), load_volume(source.reference)[0])
-    matrix, extra, weights = eq10(reference, classes["penalised"] > 0, options)
+    shell = shell_of(params.method, load_quadrature(source.shell))
+    reference = micro_reference(Mesh(points, cells), load_volume(source.reference)[0], shell)
+    if params.method == "eq10":
+        matrix, extra, weights = eq10(reference, classes["penalised"] > 0, options)
+    else:
+        matrix, extra, weights = elastic(reference, options)
     factor = factorise(matrix)
     log.info("%d unknowns, %d nonzeros in the factor", len(factor.order), factor.nonzeros)
     save_factor(snakemake.output[0], factor, extra, weights)

@@ -1,22 +1,27 @@
-"""Eq. 10: micro DVC of one state, from the finest meso result."""
+"""Micro DVC of one state by one method, from the best start on the micro mesh."""
 
-from addvc.correlation.micro import micro_reference
+from addvc.correlation.corotational import Problem, corotational
+from addvc.correlation.micro import micro_reference, shell_of, stages
 from addvc.correlation.register import Stop, System, register
-from addvc.correlation.store import load_factor, load_field, save_solution
+from addvc.correlation.store import load_factor, load_field, load_order, save_solution
 from addvc.fem.io import read_mesh
-from addvc.images.scans import load_volume
+from addvc.fem.shell import load_quadrature
+from addvc.images.files import read_json
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake):
-    source, micro = snakemake.input, snakemake.params.micro
-    reference = micro_reference(read_mesh(source.mesh), load_volume(source.reference)[0])
-    factor, extra, weights = load_factor(source.factor)
-    stop = Stop(micro["tolerance"], micro["max_iterations"])
-    solution = register(
-        System(reference, extra, factor),
-        load_volume(source.deformed)[0],
-        load_field(source.start),
-        stop,
-        "micro DVC",
-    )
-    save_solution(snakemake.output[0], solution, weights=weights)
+    source, method, micro = snakemake.input, snakemake.params.method, snakemake.params.micro
+    shell = shell_of(method, load_quadrature(source.shell))
+    reference = micro_reference(read_mesh(source.mesh), load_volume(source.reference)[0], shell)
+    deformed, start = load_volume(source.deformed)[0], load_field(source.start)
+    if method == "eq10":
+        factor, extra, notes = load_factor(source.factor)
+        stop = Stop(micro["tolerance"], micro["max_iterations"])
+        solution = register(System(reference, extra, factor), deformed, start, stop, "micro DVC")
+    else:
+        order, notes = load_order(source.factor)
+        problem = Problem(reference, notes["c"], micro["nu"], order)
+        plan = stages(micro, read_json(source.threshold), method)
+        solution, notes["stages"] = corotational(problem, deformed, start, plan)
+    save_solution(snakemake.output[0], solution, **notes)

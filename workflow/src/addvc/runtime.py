@@ -52,11 +52,17 @@ def job(snakemake) -> Iterator[logging.Logger]:
 
 @contextlib.contextmanager
 def threads(count: int) -> Iterator[None]:
-    """numba and BLAS on at most `count` threads: BLAS threads inside parallel kernels cost time."""
-    import numba
+    """numba and BLAS on at most `count` threads: BLAS threads inside parallel kernels cost time.
+
+    Most figures do without numba, which is slow to load: it then finds its number when it is."""
     from threadpoolctl import threadpool_limits
 
-    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    if "numba" in sys.modules:
+        numba = sys.modules["numba"]
+        numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    else:
+        most = int(os.environ.get("NUMBA_NUM_THREADS", count))
+        os.environ["NUMBA_NUM_THREADS"] = str(min(count, most))
     with threadpool_limits(limits=count):
         yield
 

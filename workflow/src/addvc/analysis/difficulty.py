@@ -6,7 +6,6 @@ apart from what a method misses. For judging only.
 
 import numpy as np
 from scipy import sparse
-from sksparse.cholmod import cholesky
 
 from addvc.analysis.truth import Judge
 from addvc.correlation.gauss_newton import rms
@@ -30,6 +29,8 @@ class Projection:
     least squares, seen at those points and at `nodes` (n, 3)."""
 
     def __init__(self, mesh: Mesh, points: np.ndarray, weight: np.ndarray, nodes: np.ndarray):
+        from sksparse.cholmod import cholesky
+
         self.at_points, _ = transfer_matrix(mesh, points)
         self.at_nodes, _ = transfer_matrix(mesh, nodes)
         self._weighted = self.at_points.T @ sparse.diags(weight)

@@ -60,6 +60,14 @@ def summarise(
     }
 
 
+def twin_checks(path: str | Path | None) -> dict | None:
+    """How many checks of the twin there were, and those that failed; None for other images."""
+    if path is None:
+        return None
+    checks = read_json(path)["checks"]
+    return {"count": len(checks), "failed": [check for check in checks if not check["passed"]]}
+
+
 def mesh_figures(folder: Path, mesh: str) -> dict:
     """Figures of a mesh with its ultimate error (voxels); every micro method shares one mesh."""
     name = "micro" if mesh.startswith("micro") else mesh

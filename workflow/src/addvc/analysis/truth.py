@@ -1,5 +1,6 @@
 """Errors against a known truth: for judging only. Nothing that measures may import this module."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,10 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     }
 
 
-def error_at(truth: Judge, points: np.ndarray, u: np.ndarray, state: int) -> dict:
-    """Error statistics of u (n, 3) measured at points (n, 3) of the reference."""
+def errors_at(
+    truth: Judge, points: np.ndarray, fields: Iterable[np.ndarray], state: int
+) -> list[dict]:
+    """Error statistics of each u (n, 3) of `fields`, measured at points (n, 3) of the reference."""
     tangent = None if isinstance(truth, VirtualField) else truth.strut(points)[1]
-    return error_statistics(u - truth.displacement(points, state), tangent)
+    true = truth.displacement(points, state)
+    return [error_statistics(u - true, tangent) for u in fields]

@@ -1,6 +1,6 @@
 """Eq. 2, 3, 5: the grey-level functional S(u), its modified gradient and its modified Hessian."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -28,6 +28,26 @@ def reference_on(mesh: Mesh, quadrature: Quadrature, coefficients: np.ndarray) -
     """Sample the spline of I_r (Eq. 4) at the points of a quadrature."""
     grey, gradient, inside = spline_value_gradient(coefficients, quadrature.points)
     return Reference(mesh, quadrature, grey, gradient, inside)
+
+
+def turned(reference: Reference, rotation: np.ndarray) -> Reference:
+    """The gradient of I_r carried by cells that turn, R grad I_r: near x + u it is that of I_d.
+
+    rotation (m, 3, 3) of each cell."""
+    gradient = np.einsum("qij,qj->qi", rotation[reference.quadrature.cell], reference.gradient)
+    return replace(reference, gradient=gradient.astype(reference.gradient.dtype))
+
+
+def weighted(reference: Reference, factor: np.ndarray) -> Reference:
+    """The same points with their weights multiplied by factors (Q,)."""
+    q = reference.quadrature
+    return replace(reference, quadrature=replace(q, weight=q.weight * factor))
+
+
+def geman_mcclure(r: np.ndarray, scale: float) -> np.ndarray:
+    """Weights (Q,) of iteratively reweighted least squares for rho(r) = r^2 / (1 + (r / s)^2)
+    [Geman & McClure 1987]: 1 for small residuals, 1/4 at r = s, nothing far beyond."""
+    return 1 / (1 + (r / scale) ** 2) ** 2
 
 
 def residual(

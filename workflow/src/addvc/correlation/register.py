@@ -9,6 +9,7 @@ from scipy import sparse
 from addvc.correlation.gauss_newton import Solution, gauss_newton
 from addvc.correlation.metric import (
     Reference,
+    geman_mcclure,
     residual,
     residual_statistics,
     right_hand_side,
@@ -20,11 +21,16 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """S(u) + u^T M u on one mesh: I_r sampled, M, and the factor of A = H + M."""
+    """S(u) + u^T M u + 2 u^T f on one mesh: I_r sampled, M, and the factor of A = H + M.
+
+    `load` f (3 n,): of a regularisation that is not at rest at u = 0. `scale` s of the residual
+    (grey levels): S is then the robust one of Geman and McClure."""
 
     reference: Reference
     regularisation: sparse.spmatrix | None
     factor: Factor
+    load: np.ndarray | None = None
+    scale: float | None = None
 
 
 @dataclass(frozen=True)
@@ -45,7 +51,11 @@ def register(
     def downhill(field_):
         r, inside = residual(reference, deformed, field_)
         sigma["now"] = residual_statistics(r, inside, reference.quadrature.weight)["std"]
+        if system.scale is not None:
+            r = r * geman_mcclure(r, system.scale)
         b = right_hand_side(reference, r)
+        if system.load is not None:
+            b -= system.load
         if system.regularisation is not None:
             b -= system.regularisation @ field_.ravel()
         return b

@@ -2,8 +2,8 @@
 
 Every term is normalised on a shear wave v of period T (`shear_wave`), S(v) being its quadratic form
 v^T H v, so that a weight is (cut-off / T)**order: order 4 where an operator's norm is squared (Eq.
-10), order 2 where it is used once (Eq. 9). Multiplied through by S(v), the functional reads
-S(u) + u^T M u, and it is M that these functions return.
+10), order 2 where it is used once (Eq. 9, an elastic energy). Multiplied through by S(v), the
+functional reads S(u) + u^T M u, and it is M that these functions return.
 
 In a foam ||D_K K v||^2 is dominated by the nodes of the free surface, so that it falls as T**-2
 rather than T**-4 below a period of some five cells: the cut-off then depends on T, which is why T
@@ -42,6 +42,20 @@ def diffusion(
     operator = vectorised(laplacian(mesh))
     weight = tikhonov_weight(cutoff, period, order=2)
     return operator * (weight * quadratic(hessian, v) / quadratic(operator, v))
+
+
+def elastic_weight(
+    mesh: Mesh,
+    hessian: sparse.spmatrix,
+    stiffness_: sparse.spmatrix,
+    cutoff: float,
+    period: float,
+    axis: int,
+) -> float:
+    """c of the elastic energy c u^T K u: lambda_E S(v) / (v^T K v), lambda_E = (l_E / T)**2."""
+    v = shear_wave(mesh.points, axis, period)
+    weight = tikhonov_weight(cutoff, period, order=2)
+    return weight * quadratic(hessian, v) / quadratic(stiffness_, v)
 
 
 def gap(operator: sparse.spmatrix, selected: np.ndarray) -> sparse.csr_matrix:

@@ -1,15 +1,20 @@
 """Solutions and factors on disk (HDF5), so that jobs can hand them to each other."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 from scipy import sparse
 
 from addvc.correlation.gauss_newton import Solution
-from addvc.fem.solver import Factor
 from addvc.images.files import atomic_path
+
+if TYPE_CHECKING:
+    from addvc.fem.solver import Factor
 
 
 def save_solution(path: str | Path, solution: Solution, **notes) -> None:
@@ -68,8 +73,16 @@ def save_factor(
         file.attrs["weights"] = json.dumps(weights)
 
 
+def load_order(path: str | Path) -> tuple[np.ndarray, dict]:
+    """Order of elimination (3 n,), which serves every matrix of the same pattern, and weights."""
+    with h5py.File(path) as file:
+        return file["order"][:], json.loads(file.attrs["weights"])
+
+
 def load_factor(path: str | Path) -> tuple[Factor, sparse.csr_matrix, dict]:
     """What `save_factor` wrote."""
+    from addvc.fem.solver import Factor  # and with it numba, which most jobs that read do without
+
     with h5py.File(path) as file:
         parts = {
             name: (file[name]["data"][:], file[name]["indices"][:], file[name]["indptr"][:])

@@ -19,10 +19,17 @@ def lame(nu: float, young: float = 1.0) -> tuple[float, float]:
     return young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
 
 
-def stiffness(mesh: Mesh, nu: float, pattern: Pattern | None = None) -> sparse.bsr_matrix:
-    """K (3 n, 3 n) with E = 1: symmetric, its null space the six rigid motions of the mesh."""
+def stiffness(
+    mesh: Mesh, nu: float, pattern: Pattern | None = None, rotation: np.ndarray | None = None
+) -> sparse.bsr_matrix:
+    """K (3 n, 3 n) with E = 1: symmetric, its null space the six rigid motions of the mesh.
+
+    With a rotation (m, 3, 3) of each tetrahedron, K_R: each cell's R K R^T, which for an isotropic
+    solid is K of rotated gradients."""
     pattern = pattern or node_pattern(mesh)
     gradients, weights = physical_gradients(mesh)
+    if rotation is not None:
+        gradients = np.einsum("eij,eqaj->eqai", rotation, gradients)
     blocks = scatter_stiffness(pattern.slot, gradients, weights, *lame(nu), len(pattern.indices))
     return block_matrix(pattern, blocks)
 
@@ -48,3 +55,18 @@ def strain(mesh: Mesh, u: np.ndarray, finite: bool = False) -> np.ndarray:
     slope = np.einsum("eai,eaj->eij", u[mesh.cells], gradients[:, 0])  # du_i/dx_j
     small = (slope + slope.transpose(0, 2, 1)) / 2
     return small + np.einsum("eki,ekj->eij", slope, slope) / 2 if finite else small
+
+
+def corotational_load(mesh: Mesh, nu: float, rotation: np.ndarray) -> np.ndarray:
+    """f_R = sum R K (R^T X - X) (3 n,), so that K_R u + f_R are the elastic forces of u (E = 1).
+
+    They vanish where each tetrahedron turns by just its rotation (m, 3, 3) [Mueller & Gross 2004]."""
+    lam, mu = lame(nu)
+    gradients, weights = physical_gradients(mesh)
+    small = (rotation + rotation.transpose(0, 2, 1)) / 2 - np.eye(3)
+    trace = np.einsum("eii->e", small)
+    stress = lam * trace[:, None, None] * np.eye(3) + 2 * mu * small
+    turned = np.einsum("e,eij,ejk->eik", weights[:, 0], rotation, stress)
+    force = np.einsum("eik,eak->eai", turned, gradients[:, 0]).reshape(-1, 3)
+    nodes, n = mesh.cells.ravel(), len(mesh.points)
+    return np.stack([np.bincount(nodes, column, n) for column in force.T], axis=1).ravel()

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-import pymetis
 from scipy import sparse
-from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
 
 from addvc.errors import CorrelationError
 
@@ -62,6 +60,8 @@ def triangular_solves(data, indices, indptr, b):
 
 def dissection(matrix: sparse.spmatrix, block: int = 3) -> np.ndarray:
     """Order of elimination (N,) by nested dissection of the graph of block x block entries."""
+    import pymetis  # loaded where it is needed: many jobs only read a factor
+
     nodes = sparse.bsr_matrix(matrix, blocksize=(block, block))
     graph = sparse.csr_matrix(
         (np.ones(len(nodes.indices), dtype=np.int8), nodes.indices, nodes.indptr),
@@ -82,6 +82,8 @@ def factorise(matrix: sparse.spmatrix, order: np.ndarray | None = None) -> Facto
 
     Raises CorrelationError when it is not positive definite: some unknowns are tied neither by
     the image nor by the regularisation."""
+    from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
+
     order = dissection(matrix) if order is None else order
     permuted = matrix.tocsc()[order][:, order]
     try:

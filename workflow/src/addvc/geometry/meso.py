@@ -6,6 +6,8 @@ system's random device (76 to 85 nodes for one cylinder in four runs), which no 
 same input must give the same result.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import Delaunay
 
@@ -73,10 +75,18 @@ def specimen_mesh(specimen, spacing: float) -> Mesh:
     return extruded(section, triangles, levels, specimen.axis)
 
 
-def meso_mesh(specimen, size: float) -> Mesh:
-    """Tetrahedra of the specimen whose mean edge is nearest to `size` voxels (Table 2's size).
+def meso_mesh(specimen, size: float, margin: float = 0.0) -> Mesh:
+    """Tetrahedra of the specimen whose mean edge is nearest to `size` voxels (Table 2's size), its
+    end faces `margin` voxels away from the platens.
 
     Raises MeshError when no mesh comes within 35 % of it: the specimen is too small."""
+    height = specimen.high - specimen.low
+    if 2 * margin >= height:
+        raise MeshError(
+            f"the specimen is {height:.1f} voxels high, and meso.margin {margin:g} (less than "
+            f"{height / 2:.1f}) leaves nothing of it; lower meso.margin"
+        )
+    specimen = replace(specimen, low=specimen.low + margin, high=specimen.high - margin)
     best, edge = None, np.inf
     for share in TRIALS:
         mesh = specimen_mesh(specimen, share * size)

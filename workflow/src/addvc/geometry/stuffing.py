@@ -16,7 +16,6 @@ gives four tetrahedra (both centres and one edge of the face).
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
-from skimage.morphology import skeletonize
 
 from addvc.fem.mesh import TET_EDGES, Mesh, oriented
 
@@ -78,6 +77,8 @@ class _Field:
 
 def skeleton_points(solid: np.ndarray) -> np.ndarray:
     """Voxels (n, 3) of the skeleton of a solid and the middles between neighbours, in voxels."""
+    from skimage.morphology import skeletonize  # slow to load, and needed here only
+
     line = np.argwhere(skeletonize(solid)).astype(float)
     pairs = cKDTree(line).query_pairs(1.8, output_type="ndarray")
     return np.vstack([line, line[pairs].mean(axis=1)])

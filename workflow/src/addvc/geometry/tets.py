@@ -11,7 +11,6 @@ import tempfile
 from dataclasses import dataclass
 
 import numpy as np
-import pytetwild
 
 from addvc.errors import MeshError
 from addvc.fem.mesh import Mesh, face_components, oriented, submesh
@@ -44,6 +43,8 @@ def tetrahedralise(surface: Surface, options: TetOptions) -> Mesh:
     """Tetrahedra of the inside of a surface, positively oriented.
 
     Raises MeshError when the mesher returns nothing."""
+    import pytetwild  # and with it pyvista, which the lattice does without
+
     diagonal = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     with scratch_folder():
         points, cells = pytetwild.tetrahedralize(

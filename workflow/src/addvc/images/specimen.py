@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.filters import threshold_otsu
 
 from addvc.errors import GeometryError
 from addvc.images.levels import bin_mean, to_fine
@@ -193,6 +192,8 @@ def _rows_between(volume: NDArray, axis: int, low: float, high: float) -> NDArra
 
 def solid_threshold(volume: NDArray) -> float:
     """Otsu's grey level between void and solid, of at most about two million voxels."""
+    from skimage.filters import threshold_otsu  # slow to load, and needed here only
+
     step = int(np.ceil((volume.size / OTSU_VOXELS) ** (1 / 3)))
     values = volume[::step, ::step, ::step]
     darkest, brightest = np.percentile(values, (0.05, 99.95))  # hot voxels would blunt the bins

@@ -32,7 +32,7 @@ def twin_check(case: Case, outputs: Iterable[str]) -> None:
     """Every check of the twin with its limits and whether they hold."""
     rows = [["Check", "Value", "Unit", "At least", "At most", "Holds"]]
     for check in case.json("analysis/twin_check.json")["checks"]:
-        low, high = ("–" if x is None else f"{x:.3g}" for x in (check["low"], check["high"]))
+        low, high = ("–" if x is None else f"{x:.4g}" for x in (check["low"], check["high"]))
         holds = "yes" if check["passed"] else "NO"
         rows.append([check["name"], f"{check['value']:.4g}", check["unit"], low, high, holds])
     for path in outputs:

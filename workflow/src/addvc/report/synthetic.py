@@ -25,7 +25,7 @@ def scans(case: Case, outputs: Iterable[str]) -> None:
     images = [case.image(n, smooth=False) for n in numbers]
     pictures = [_upright(v, specimen.axis, normal) for v, _ in images]
     nx, ny = pictures[0][0].shape
-    fig, axes = style.panels(2, len(numbers), ny / nx, spare=9, bar=14)
+    fig, axes = style.panels(2, len(numbers), ny / nx, spare=7, bar=14)
     limits = tuple(np.percentile(images[0][0], (0.5, 99.9)))
     for column, (state, pair) in enumerate(zip(numbers, pictures, strict=True)):
         for ax, plane in zip(axes[:, column], pair, strict=True):
@@ -63,13 +63,13 @@ def network(case: Case, outputs: Iterable[str], files: list[str]) -> None:
     for ax in axes.flat[len(bodies) :]:
         ax.set_axis_off()
     for panel, (state, (points, faces, values)) in enumerate(zip(case.states, bodies, strict=True)):
-        layer = Layer(points, faces, values=values, norm=norm, cmap="inferno")
+        layer = Layer(points, faces, values=values, norm=norm, cmap="plasma")
         ax = axes.flat[panel]
         render([layer], view, style.WIDTH / columns, fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state], panel)
     style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
     label = "bending energy per length of the strut, over its mean (–)"
-    style.colour_bar(fig, axes, norm, "inferno", label, shrink=0.6)
+    style.colour_bar(fig, axes, norm, "plasma", label, shrink=0.6)
     style.save(fig, outputs)
 
 
@@ -102,16 +102,16 @@ def mechanics(case: Case, outputs: Iterable[str], history: str) -> None:
     stress, energy, cost = fig.subplots(1, 3)
     area = np.pi * case.specimen.radius**2
     stress.plot(np.r_[0, strain], np.r_[0, 1e4 * table["force_low"] / area], color=style.DARK)
-    stress.set(ylabel="nominal stress / modulus of the strut (10⁻⁴)")
+    stress.set(ylabel="nominal stress / E (10⁻⁴)")
     _shares(energy, strain, table)
     cost.semilogy(strain, table["steps"], "o-", ms=2.5, color=style.DARK)
-    cost.set(ylabel="steps of the descent to equilibrium")
+    cost.set(ylabel="steps to equilibrium (–)")
     titles = "stress", "energy", "convergence"
     for panel, (ax, title) in enumerate(zip((stress, energy, cost), titles, strict=True)):
-        ax.set(xlabel="nominal strain (%)", xlim=(0, strain[-1]))
+        ax.set(xlabel="nominal strain (%)", xlim=(0, 1.03 * strain[-1]))
         ax.set_ylim(bottom=0 if panel < 2 else 1)
         for n in case.states:
-            ax.axvline(_percent(case.labels[n]), color="#999999", lw=0.6, ls=":", zorder=0)
+            ax.axvline(_percent(case.labels[n]), color="#555555", lw=0.7, ls=":")
         style.headline(ax, title, panel)
     style.save(fig, outputs)
 
@@ -127,4 +127,4 @@ def _shares(ax: Axes, strain: np.ndarray, table: dict[str, np.ndarray]) -> None:
     shares = [table[name] / total for name in ENERGIES]
     ax.stackplot(strain, shares, labels=ENERGIES, colors=style.SERIES[1:5], alpha=0.85)
     ax.set(ylabel="share of the elastic energy (–)", ylim=(0, 1))
-    ax.legend(loc="lower left", frameon=True, framealpha=0.85, edgecolor="none")
+    ax.legend(loc="lower left", frameon=True, framealpha=0.95, edgecolor="none")

@@ -87,7 +87,9 @@ def _column(case: Case, name: str, config: dict, methods: dict[str, str]) -> dic
     image = case.json("input.json")["scans"][0]["binned_shape"]
     given = _micro(case, config, methods[name]) if micro else _meso(case, name, config)
     shared = {
-        "Ultimate error (voxels)": _ultimate(case, name),
+        "Ultimate error (voxels)": _ultimate(case, name, "ultimate_error"),
+        "The same with noise (voxels)": _ultimate(case, name, "with_noise"),
+        "Standard uncertainty a priori (voxels)": _ultimate(case, name, "a_priori"),
         "FE type": "4-node tetrahedron (Lagrange)",
         "Nodes": str(facts["nodes"]),
         "Elements": str(facts["cells"]),
@@ -115,16 +117,19 @@ def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
 def _micro(case: Case, config: dict, method: str) -> dict[str, str]:
     """Functional, lengths and start of a micro method."""
     options = micro_options(config["micro"], case.cell_size, case.specimen.axis)
-    functional = "Eq. 10" if method == "eq10" else method
+    if method == "eq10":
+        functional, lengths = "Eq. 10", f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}"
+    else:
+        functional, lengths = method.replace("_", " "), f"l_E = {options.l_e:.3g}"
     return {
         "Matching functional": functional,
-        "Regularisation length (voxels)": f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}",
+        "Regularisation length (voxels)": lengths,
         "Initialisation": f"solution of {case.finest}",
     }
 
 
-def _ultimate(case: Case, name: str) -> str:
-    value = case.json(f"analysis/ultimate_{name}.json").get("ultimate_error")
+def _ultimate(case: Case, name: str, key: str) -> str:
+    value = case.json(f"analysis/ultimate_{name}.json").get(key)
     return "–" if value is None else f"{value:.2e}"
 
 

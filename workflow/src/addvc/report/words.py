@@ -23,6 +23,10 @@ def closing_lines(summary: dict, folder: str) -> str:
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
             + error_words(found["error"])
         )
+    failed = failed_checks(summary)
+    if failed:
+        count = f"{len(failed)} of {summary['twin_checks']['count']}"
+        lines.append(f"  {count} checks of the synthetic test do not hold: see the report")
     lines.append(f"  open the report: xdg-open {folder}/report.html")
     return "\n".join(lines)
 
@@ -146,7 +150,30 @@ def warnings(summary: dict) -> list[str]:
             "bound it from below only. `virtual` in the configuration measures it for a "
             "smooth field on your own reference."
         )
+    found += [
+        f"- The synthetic test is not what it claims to be: {check_words(check)}."
+        for check in failed_checks(summary)
+    ]
     return found or ["None."]
+
+
+def failed_checks(summary: dict) -> list[dict]:
+    """Checks of the twin that do not hold; none for other images."""
+    return (summary.get("twin_checks") or {"failed": []})["failed"]
+
+
+def check_words(check: dict) -> str:
+    """A check that does not hold: its value, its limit, its remedy."""
+    unit = "" if check["unit"] == "–" else f" {check['unit']}"
+    limits = [
+        f"{word} {check[key]:.4g}"
+        for word, key in (("at least", "low"), ("at most", "high"))
+        if check[key] is not None
+    ]
+    return (
+        f"{check['name']} is {figure(check['value'], '.4g')}{unit} ({', '.join(limits)}); "
+        f"{check['remedy']}"
+    )
 
 
 def results_table(summary: dict) -> list[str]:

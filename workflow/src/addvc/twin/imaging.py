@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator
 
 import numpy as np
-import tifffile
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from addvc.images.files import atomic_path
@@ -132,6 +131,8 @@ def pages(volume: np.ndarray) -> Iterator[np.ndarray]:
 
 def write_scan(path: str | os.PathLike, volume: np.ndarray) -> None:
     """Multi-page TIFF of a volume (nx, ny, nz): page = z, row = y, column = x; atomic."""
+    import tifffile  # loaded where it is needed: a truth is read without
+
     with atomic_path(path) as temporary:
         tifffile.imwrite(
             temporary,

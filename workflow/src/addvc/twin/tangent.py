@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from scipy import sparse
-from sksparse.cholmod import CholmodNotPositiveDefiniteError, analyze
 
 from addvc.fem.assembly import find_slots
 from addvc.fem.solver import dissection
@@ -52,6 +51,8 @@ class Tangent:
 
 def tangent_pattern(structure: Structure, pairs: np.ndarray, positions: np.ndarray) -> Tangent:
     """An empty tangent with room for the pairs of beams (p, 2), found at positions (n, 3)."""
+    from sksparse.cholmod import analyze  # loaded where it is needed: a truth is read without
+
     n = len(structure.reference)
     groups = structure.elements, structure.elements[pairs].reshape(-1, 4)
     rows = np.concatenate([np.repeat(g, g.shape[1], axis=1).ravel() for g in groups])
@@ -123,6 +124,8 @@ def newton_step(
     tangent: Tangent, gradient: np.ndarray, damping: np.ndarray | None = None
 ) -> np.ndarray | None:
     """-(W'' + damping)^-1 gradient (n, 6), or None where that is not positive definite."""
+    from sksparse.cholmod import CholmodNotPositiveDefiniteError
+
     matrix = tangent.matrix
     if damping is not None:
         matrix = matrix.copy()
