@@ -185,6 +185,7 @@ rule noise_draws:
     input:
         mesh=f"{R}/geometry/micro.vtu",
         reference=f"{R}/volumes/smooth0.h5",
+        shell=f"{R}/geometry/shell.h5",
         factor=f"{R}/dvc/{MICRO[0]}_factor.h5",
         threshold=f"{R}/geometry/threshold.json",
     output:
@@ -202,6 +203,7 @@ rule noise_draws:
     params:
         code=code("analysis/noise_draws.py"),
         blur=config["images"]["blur"],
+        method=settings.micro_names(config)[MICRO[0]],
     script:
         "../scripts/analysis/noise_draws.py"
 

@@ -5,7 +5,7 @@ from addvc.analysis.struts import partition
 from addvc.fem.io import read_mesh, write_mesh
 from addvc.geometry.skeleton import strut_graph
 from addvc.images.files import read_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:

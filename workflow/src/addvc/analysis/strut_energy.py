@@ -3,7 +3,8 @@
 Per length, for a round section of area A: bending E I k^2 / 2, stretching E A e^2 / 2 and torsion
 G J w^2 / 2, with I = A^2 / 4 pi, J = 2 I, G = E / 2 (1 + nu). Energies are in units of Young's
 modulus times voxel^3. Noise adds its variance to each square; energies are therefore expectations
-under what is likely of the strut (`strut_prior`), so that noise alone has none.
+under what is likely of the strut (`strut_prior`), so that noise alone has none. The scatter of the
+nodes about a beam is no noise: it only widens the deviations.
 """
 
 from dataclasses import dataclass
@@ -62,18 +63,16 @@ def strut_energy(
     area = (strut.area[1:] + strut.area[:-1]) / 2
     inertia = area**2 / (4 * np.pi)
     forms = quadratic_forms(fit, area, inertia, nu)
-    c, noise, doubt = fit.coefficients, fit.covariance, 0 * fit.covariance
-    mean = c
+    c, mean, doubt = fit.coefficients, fit.coefficients, np.zeros_like(fit.noise)
     if variances is not None:
-        mean, noise = posterior(c, noise, variances)
-        doubt = noise
+        mean, doubt = posterior(c, fit.noise, variances)
     energies = np.array([mean @ form @ mean + np.trace(form @ doubt) for form in forms])
     slopes = 2 * np.stack([form @ mean for form in forms])
     return StrutEnergy(
         energies,
-        slopes @ noise @ slopes.T,
+        slopes @ (doubt + fit.covariance) @ slopes.T,
         float(c[STRETCH][0]),
-        float(np.sqrt(fit.covariance[STRETCH, STRETCH][0, 0])),
+        float(np.sqrt((fit.covariance + fit.noise)[STRETCH, STRETCH][0, 0])),
         float(np.sqrt(2 * energies[0] / (inertia @ fit.beam.length))),
         float(c[TWIST][0]),
     )

@@ -10,7 +10,7 @@ twist, stretch and shear that are constant: these 8 coefficients and the 6 of a 
 to the nodes of the strut, x = r(s) + R(s) (X - c(s)), by least squares weighted with volume. Rotations
 are finite, so that a rigid motion has no strain. The scatter of the nodes about the fit gives a
 covariance of the coefficients, by leaving out one slice after the other (a jackknife), since errors of
-neighbours go together. What the noise of the images does has to be added: it moves whole ends.
+neighbours go together. What the noise of the images does is known apart: it moves whole ends.
 """
 
 from dataclasses import dataclass
@@ -75,12 +75,14 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class StrutMotion:
-    """Coefficients (8,) of twist and bending (1/voxel), stretch and shear, with their covariance
-    (8, 8); `scatter`: rms distance of the nodes from the fit, voxels; `rotation`: of the middle."""
+    """Coefficients (8,) of twist and bending (1/voxel), stretch and shear; their covariance (8, 8) by
+    the scatter of the nodes about the fit, and by the noise of the images, zero where it is not known;
+    `scatter`: rms distance of the nodes from the fit, voxels; `rotation`: of the middle."""
 
     beam: Beam
     coefficients: np.ndarray
     covariance: np.ndarray
+    noise: np.ndarray
     motion: Motion
     scatter: float
     rotation: np.ndarray
@@ -92,8 +94,8 @@ def strut_motion(
 ) -> StrutMotion:
     """The motion of a strut whose nodes at points (k, 3) are displaced by u (k, 3).
 
-    draws (d, k, 3): displacements that the noise of the images makes; what the coefficients make of
-    them is added to their covariance, since noise that moves a whole end leaves no scatter."""
+    draws (d, k, 3): displacements that the noise of the images makes. Noise that moves a whole end
+    leaves no scatter."""
     beam, weight = Beam.of(strut), strut.weight / strut.weight.sum()
     below = np.minimum(strut.place.astype(int), len(beam.chord) - 1)
     at = Places(below, (strut.place - below)[:, None])
@@ -113,11 +115,13 @@ def strut_motion(
         if converged:
             break
     covariance = jackknife(slopes, error, weight, sections(strut))[RIGID:, RIGID:]
+    noise = np.zeros_like(covariance)
     if draws is not None:
-        found = np.linalg.solve(normal, np.einsum("pki,dki,k->pd", slopes, draws, weight))[RIGID:]
-        covariance = covariance + found @ found.T / len(draws)
+        pushes = np.einsum("pki,dki,k->pd", slopes, draws, weight, optimize=True)
+        found = np.linalg.lstsq(normal, pushes, rcond=None)[0][RIGID:]
+        noise = found @ found.T / len(draws)
     scatter = float(np.sqrt(weight @ (error**2).sum(axis=1)))
-    return StrutMotion(beam, values, covariance, motion, scatter, turn, converged)
+    return StrutMotion(beam, values, covariance, noise, motion, scatter, turn, converged)
 
 
 def _middle(beam: Beam) -> int:

@@ -22,13 +22,16 @@ def save_partition(path: str | Path, struts: list[Strut], junctions: np.ndarray)
         file["count"] = np.array([len(strut.nodes) for strut in struts], dtype=np.int64)
         for name in (field.name for field in fields(Strut)):
             values = [getattr(strut, name) for strut in struts]
-            file[name] = np.concatenate(values) if name in RAGGED else np.array(values)
+            joined = struts and name in RAGGED
+            file[name] = np.concatenate(values) if joined else np.array(values)
         file.attrs["unit"] = "voxel of the binned image"
 
 
 def load_partition(path: str | Path) -> tuple[list[Strut], np.ndarray]:
     """What `save_partition` wrote."""
     with h5py.File(path) as file:
+        if len(file["count"]) == 0:
+            return [], file["junctions"][:]
         cuts = np.cumsum(file["count"][:])[:-1]
         columns = {}
         for name in (field.name for field in fields(Strut)):

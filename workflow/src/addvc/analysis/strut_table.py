@@ -81,13 +81,15 @@ def strut_table(
 
 def geometry(struts: list[Strut]) -> dict[str, list]:
     """The columns that do not depend on the displacement, but for `valid`."""
+    names = [name for name in GEOMETRY if name != "valid"]
+    if not struts:
+        return {name: [] for name in names}
     rows = []
     for number, (strut, near) in enumerate(zip(struts, neighbours(struts), strict=True)):
         others = " ".join(str(n) for n in near if n != number)
         whole = int(strut.whole and not strut.broken)
         values = [*strut.middle, float(strut.length), strut.radius, *strut.direction, whole]
         rows.append([*values, *strut.ends, others])
-    names = [name for name in GEOMETRY if name != "valid"]
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
@@ -120,7 +122,7 @@ def mechanics(
     if known.any():
         good = [fit for fit, use in zip(fits, known, strict=True) if use]
         variances = prior_variances(
-            np.array([fit.coefficients for fit in good]), np.array([fit.covariance for fit in good])
+            np.array([fit.coefficients for fit in good]), np.array([fit.noise for fit in good])
         )
     rows = [row(strut, fit, nu, variances) for strut, fit in zip(struts, fits, strict=True)]
     return {name: [values[name] for values in rows] for name in MECHANICS}

@@ -74,6 +74,8 @@ def partition(mesh: Mesh, graph: StrutGraph, excess: np.ndarray) -> list[Strut]:
     """Struts of a micro mesh, those with enough solid between their junctions to be measured.
 
     excess (nx, ny, nz): the grey level of the reference above that of the void."""
+    if not graph.branches:
+        return []
     volume, centre = np.abs(cell_volumes(mesh)), mesh.points[mesh.cells].mean(axis=1)
     weight = np.bincount(mesh.cells.ravel(), np.repeat(volume / 4, 4), len(mesh.points))
     lines = [resampled(branch.points, SPACING) for branch in graph.branches]

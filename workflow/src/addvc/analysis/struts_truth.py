@@ -70,7 +70,7 @@ def unloaded(columns: dict[str, np.ndarray], ending: str, volume: np.ndarray) ->
     """(n,) bool: struts of volumes (n,) with hardly any energy, as those that end in the open."""
     energy = np.sum([columns[kind + ending] for kind in KINDS], axis=0)
     known = np.isfinite(energy)
-    return known & (energy / volume < LOADED * energy[known].sum() / volume[known].sum())
+    return known & (energy * volume[known].sum() < LOADED * volume * energy[known].sum())
 
 
 def judged(table: dict, true: dict, results: dict[str, str]) -> dict:

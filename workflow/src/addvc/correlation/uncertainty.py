@@ -10,7 +10,7 @@ says where elements are larger than a voxel. So b is drawn from noise fields, an
 mean of u^2: exact in the mean, to 1 / sqrt(2 n draws) of its rms over n unknowns.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,13 +39,31 @@ class Noise:
 def of_noise(system: System, at_points: Callable[[], np.ndarray], draws: int) -> np.ndarray:
     """Standard uncertainty (n, 3) of each nodal displacement (voxels) when the residual is what
     at_points() draws (Q,) (grey levels)."""
+    square = np.zeros_like(system.reference.mesh.points)
+    for u in drawn(system, at_points, draws):
+        square += u**2 / draws
+    return np.sqrt(square)
+
+
+def drawn(system: System, at_points: Callable[[], np.ndarray], draws: int) -> Iterator[np.ndarray]:
+    """Displacements (n, 3), voxels, that residuals make which at_points() draws (Q,)."""
     reference = system.reference
-    square = np.zeros_like(reference.mesh.points)
     for _ in range(draws):
         r = np.where(reference.inside, at_points(), 0)
-        u = system.factor.solve(right_hand_side(reference, r))
-        square += u.reshape(square.shape) ** 2 / draws
-    return np.sqrt(square)
+        yield system.factor.solve(right_hand_side(reference, r)).reshape(-1, 3)
+
+
+def fields_of_noise(
+    system: System, shape: tuple[int, int, int], noise: Noise, draws: int = 2 * DRAWS
+) -> np.ndarray:
+    """Displacements (d, n, 3), float32 voxels, by the noise of two images of `shape`: they hold what
+    the uncertainty of a node does not, how the errors of neighbours go together."""
+    rng, points = np.random.default_rng(SEED), system.reference.quadrature.points
+
+    def at_points():
+        return np.sqrt(2) * spline_value(noise.volume(shape, rng), points)[0]
+
+    return np.stack([u.astype(np.float32) for u in drawn(system, at_points, draws)])
 
 
 def a_priori(

@@ -5,6 +5,7 @@ the lines between them branches. What thinning makes up is taken back: clusters 
 nearer than a strut is thick are one junction, and ends shorter than a strut is wide are no struts.
 """
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
-from addvc.errors import GeometryError
+log = logging.getLogger(__name__)
 
 NEIGHBOUR = 1.8
 """Voxels: beyond the 26 neighbours' sqrt(3), below 2."""
@@ -53,8 +54,8 @@ class StrutGraph:
 
 
 def strut_graph(solid: np.ndarray) -> StrutGraph:
-    """The graph of a solid (nx, ny, nz) of bool, points in voxels. GeometryError if it has no
-    junction, and so no struts."""
+    """The graph of a solid (nx, ny, nz) of bool, points in voxels; empty, with a warning, where
+    nothing meets."""
     depth = ndimage.distance_transform_edt(np.pad(solid, 1))[1:-1, 1:-1, 1:-1]
     voxels = np.argwhere(skeletonize(solid))
     radius = depth[tuple(voxels.T)]
@@ -62,10 +63,12 @@ def strut_graph(solid: np.ndarray) -> StrutGraph:
     degree = np.asarray(links.sum(axis=1)).ravel()
     knots = np.flatnonzero(degree > 2)
     if len(knots) == 0:
-        raise GeometryError(
-            f"the skeleton of the solid has {len(voxels)} voxels and no junction (at least 1); "
-            "widen micro.region, or lower the threshold"
+        log.warning(
+            "WARNING: the skeleton of the solid has %d voxels and no junction (at least 1), so that "
+            "there are no struts; widen micro.region, or lower the threshold",
+            len(voxels),
         )
+        return StrutGraph(np.zeros((0, 3)), np.zeros(0), [])
     count, knot = connected_components(links[knots][:, knots], directed=False)
     middles = np.stack([ndimage.mean(x, knot, range(count)) for x in voxels[knots].T], axis=1)
     cluster = np.full(len(voxels), FREE_END)

@@ -31,6 +31,9 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     state, view = case.shown_state(), oblique(case.specimen.axis)
     struts, junctions = load_partition(case.path("geometry/struts.h5"))
     table = read_columns(case.path(f"struts_state{state}.csv"))
+    if not struts:
+        style.save(without_struts(), outputs)
+        return
     points, faces, owner = tubes(struts, junctions)
     sources = {case.micro[0]: "", case.finest: MESO}
     fig, axes = style.panels(2, 2, aspect(view, points), spare=9, bar=16)
@@ -54,11 +57,18 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     style.save(fig, outputs)
 
 
+def without_struts() -> Figure:
+    """A figure that says that there is nothing to show."""
+    fig = style.figure(30)
+    fig.text(0.5, 0.5, "no struts between junctions were found", ha="center", va="center")
+    return fig
+
+
 def strain_range(table: dict[str, np.ndarray], suffixes: Iterable[str]) -> Normalize:
     """Range of the axial strains of the valid struts, of all results, about zero."""
     valid = table["valid"] > 0
     return style.robust_range(
-        [table[f"axial_strain{s}"][valid] for s in suffixes], signed=True, share=2.5
+        [np.r_[table[f"axial_strain{s}"][valid], 0] for s in suffixes], signed=True, share=2.5
     )
 
 
