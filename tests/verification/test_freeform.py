@@ -10,16 +10,18 @@ from addvc.correlation.freeform import (
     LEVELS,
     FreeformOptions,
     affine_start,
-    clear_points,
     freeform,
     freeform_options,
+)
+from addvc.correlation.gauss_newton import rms
+from addvc.correlation.spline_grid import evaluate, grid_over
+from addvc.correlation.spline_metric import (
+    clear_points,
     hessian,
     linearise,
     right_hand_side,
     sample,
 )
-from addvc.correlation.gauss_newton import rms
-from addvc.correlation.spline_grid import evaluate, grid_over
 from addvc.correlation.spline_stencil import stencil_product
 from addvc.correlation.ultimate import fft_shift
 from addvc.errors import CorrelationError
@@ -53,7 +55,7 @@ def image(speckle):
 @pytest.fixture
 def small(image):
     """I_r sampled on a grid of 8 voxels, well inside of the image."""
-    return well_inside(sample(grid_over(image.shape, 8.0), image, LEVELS[-1]))
+    return well_inside(sample(grid_over(image.shape, 8.0), image, 1, 8.0))
 
 
 def well_inside(sampling):
@@ -103,7 +105,7 @@ def test_hessian_is_the_curvature_of_the_functional_at_the_solution(small, image
 def test_mean_gradient_predicts_a_motion_one_order_better(speckle):
     """r - g . d falls with slope 3 in the motion d for the mean gradient, 2 for that of I_r."""
     volume = speckle((48, 52, 50), length=10.0)
-    small = well_inside(sample(grid_over(volume.shape, 8.0), volume, LEVELS[-1]))
+    small = well_inside(sample(grid_over(volume.shape, 8.0), volume, 1, 8.0))
     steps, way = np.array([1.6, 0.8, 0.4]), np.array([0.5, -0.6, 0.62])
     mean, plain = [], []
     for t in steps:

@@ -2,5 +2,6 @@
 
 May import `images`, `fem`, `geometry` and `errors`. No step reads a truth.
 Eq. 2, 3, 5: metric, gauss_newton. Eq. 6, 7: reduced_basis. Eq. 9 to 11: regularisation.
-Appendix A: transfer. Starts beyond the paper: spline_grid, spline_stencil, freeform, micro_start.
+Appendix A: transfer. Starts beyond the paper: freeform, on spline_grid, spline_stencil and
+spline_metric; micro_start.
 """

@@ -1,11 +1,9 @@
 """Free-form DVC: a displacement on a cubic B-spline grid, found from rest, coarse to fine.
 
 No mesh and no mechanics: the grid covers the whole image with what it shows of the platens, whose
-faces in both images give the affine field to begin with. Each level has a grid and a blur. Only
-voxels where the reference has a clear gradient take part: at large strain the void beside a strut
-meets other struts, and pulls the wrong way. Gauss-Newton takes the mean of the gradients of I_r at X
-and of I_d at X + u, which reaches farther than either; the functional gets the bending energy of
-the grid, weighted by a cut-off length on a shear wave of four spacings, as in Eq. 11.
+faces in both images give the affine field to begin with. Each level has a grid and a blur. The
+functional gets the bending energy of the grid, weighted by a cut-off length on a shear wave of four
+spacings, as in Eq. 11.
 """
 
 import logging
@@ -15,35 +13,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from addvc.correlation.gauss_newton import Solution, rms
-from addvc.correlation.metric import residual_statistics
 from addvc.correlation.regularisation import shear_wave, tikhonov_weight
-from addvc.correlation.spline_grid import (
-    SplineGrid,
-    SplinePoints,
-    grid_over,
-    refine,
-    scatter_vectors,
-    spline_points,
-    sum_basis,
+from addvc.correlation.spline_grid import SplineGrid, grid_over, refine
+from addvc.correlation.spline_metric import (
+    Sampling,
+    hessian,
+    linearise,
+    right_hand_side,
+    sample,
+    statistics,
 )
 from addvc.correlation.spline_stencil import (
     add_scalar,
     bending,
     conjugate_gradient,
     scalar_product,
-    scatter_dyads,
     stencil_product,
 )
-from addvc.errors import CorrelationError
 from addvc.images.platens import find_platens
-from addvc.images.spline import gaussian_blur, spline_value_gradient
+from addvc.images.spline import gaussian_blur
 
 log = logging.getLogger(__name__)
 
-MAXWELL_MEDIAN = 1.538  # median length of a vector of three normal deviates of variance one
-STRONG = 99  # percentile of the gradients that stands for those of the structure
-CLEARLY = 0.25  # of that is enough, however noisy
-BLANK = 1e-5  # of the grey level: less is round-off
 NOMINAL_CELL = 28.0  # voxels: the cell size that LEVELS is written for
 
 
@@ -99,74 +90,6 @@ def scaled(level: Level, scale: float) -> Level:
     return replace(level, stride=stride, **lengths)
 
 
-@dataclass(frozen=True, eq=False)
-class Sampling:
-    """I_r at the points of a level: where they are on the grid, grey level, gradient, weight."""
-
-    grid: SplineGrid
-    points: SplinePoints
-    grey: np.ndarray
-    gradient: np.ndarray
-    weight: np.ndarray
-
-    def displacement(self, coefficients: np.ndarray) -> np.ndarray:
-        """u (Q, 3) at the points."""
-        return sum_basis(coefficients, self.points.cell, self.points.basis)
-
-
-def sample(grid: SplineGrid, coefficients: np.ndarray, level: Level) -> Sampling:
-    """The points of a level in I_r given by its spline coefficients, blurred already."""
-    points = spline_points(grid, clear_points(coefficients, level.stride, level.clear))
-    grey, gradient, _ = spline_value_gradient(coefficients, points.points)
-    weight = np.full(len(grey), float(level.stride**3))
-    return Sampling(grid, points, grey, gradient.astype(float), weight)
-
-
-def clear_points(coefficients: np.ndarray, stride: int, clear: float) -> np.ndarray:
-    """Every stride-th voxel centre whose gradient exceeds `clear` times the noise (Q, 3).
-
-    The noise is that of the median voxel, which lies in the void. A quarter of the strong gradients
-    is enough: in a texture, which has no void, most voxels take part."""
-    lines = [np.arange(stride // 2, n, stride, dtype=float) for n in coefficients.shape]
-    plane = np.stack(np.meshgrid(*lines[1:], indexing="ij"), axis=-1).reshape(-1, 2)
-    length = np.empty((len(lines[0]), len(plane)), np.float32)
-    for i, x in enumerate(lines[0]):  # plane by plane: all points at once would take gigabytes
-        points = np.column_stack([np.full(len(plane), x), plane])
-        length[i] = np.linalg.norm(spline_value_gradient(coefficients, points)[1], axis=1)
-    noise, strong = np.median(length) / MAXWELL_MEDIAN, np.percentile(length, STRONG)
-    if strong <= BLANK * np.abs(coefficients).max():
-        raise CorrelationError(
-            f"the gradient of the reference is at most {strong:.1e} grey level a voxel at {STRONG} % "
-            "of its voxels: it is blank; check the scan, or leave freeform out of meso.candidates"
-        )
-    i, j = np.nonzero(length > min(clear * noise, CLEARLY * strong))
-    return np.column_stack([lines[0][i], plane[j]])
-
-
-def linearise(
-    sampling: Sampling, deformed: np.ndarray, u: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Eq. 5 and its slope: r (Q,), the mean of both gradients (Q, 3), inside (Q,), at u (Q, 3).
-
-    Points that have left I_d have neither."""
-    grey, gradient, inside = spline_value_gradient(deformed, sampling.points.points + u)
-    r = np.where(inside, sampling.grey - grey, 0.0).astype(float)
-    mean = (sampling.gradient + gradient) / 2
-    return r, np.where(inside[:, None], mean, 0.0), inside
-
-
-def hessian(sampling: Sampling, slope: np.ndarray) -> np.ndarray:
-    """H of Eq. 3 between control points, as a stencil."""
-    points = sampling.points
-    return scatter_dyads(sampling.grid.cells, points.first, points.basis, slope, sampling.weight)
-
-
-def right_hand_side(sampling: Sampling, r: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """b of Eq. 3 (nx, ny, nz, 3)."""
-    points, vectors = sampling.points, (sampling.weight * r)[:, None] * slope
-    return scatter_vectors(sampling.grid.cells, points.first, points.basis, vectors)
-
-
 def bending_weight(
     grid: SplineGrid, h: np.ndarray, energy: np.ndarray, cutoff: float, axis: int
 ) -> float:
@@ -196,36 +119,28 @@ def affine_start(
 
 
 def register_level(
-    sampling: Sampling,
-    deformed: np.ndarray,
-    coefficients: np.ndarray,
-    level: Level,
-    options: FreeformOptions,
+    sampling: Sampling, deformed: np.ndarray, p: np.ndarray, level: Level, options: FreeformOptions
 ) -> Solution:
-    """Gauss-Newton on one level, H anew at each step; u of the solution holds the coefficients."""
+    """Gauss-Newton on one level, H anew at each step; u of the solution holds the coefficients p."""
     grid, history, start = sampling.grid, [], time.perf_counter()
-    energy, weight = bending(grid), None
-    u = sampling.displacement(coefficients)
-    while len(history) < level.iterations:
+    energy, weight, u = bending(grid), None, sampling.displacement(p)
+    for _ in range(level.iterations):
         r, slope, _ = linearise(sampling, deformed, u)
         h = hessian(sampling, slope)
         if weight is None:
             weight = bending_weight(grid, h, energy, level.cutoff, options.axis)
-        b = right_hand_side(sampling, r, slope) - weight * scalar_product(energy, coefficients)
+        b = right_hand_side(sampling, r, slope) - weight * scalar_product(energy, p)
         add_scalar(h, energy, weight)
         step, _ = conjugate_gradient(h, b, level.accuracy, level.most)
         du = sampling.displacement(step)
         history.append(rms(du))
         if not np.isfinite(history[-1]):
             break
-        coefficients, u = coefficients + step, u + du
+        p, u = p + step, u + du
         if history[-1] < options.tolerance:
             break
-    r, _, inside = linearise(sampling, deformed, u)
-    converged = bool(history[-1] < options.settled)
-    seconds = time.perf_counter() - start
-    statistics = residual_statistics(r, inside, sampling.weight)
-    return Solution(coefficients, history, converged, seconds, statistics)
+    settled, found = history[-1] < options.settled, statistics(sampling, deformed, u)
+    return Solution(p, history, bool(settled), time.perf_counter() - start, found)
 
 
 def freeform(
@@ -240,7 +155,7 @@ def freeform(
     for level in options.levels:
         while grid.spacing > 1.01 * level.spacing:
             grid, u = grid.finer(), refine(u)
-        sampling = sample(grid, gaussian_blur(reference, level.blur), level)
+        sampling = sample(grid, gaussian_blur(reference, level.blur), level.stride, level.clear)
         blurred = gaussian_blur(deformed, level.blur)
         solution = register_level(sampling, blurred, u, level, options)
         u, history = solution.u, history + solution.history

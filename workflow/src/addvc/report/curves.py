@@ -139,17 +139,18 @@ def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:
 
     names: results in the order they are drawn, the free-form start among them."""
     fig, axes = _error_panels(case, names)
+    look = {name: n for n, name in enumerate(dict.fromkeys([*case.meso, *case.micro, *names]))}
     for place, name in enumerate(names):
         for column, state in enumerate(case.states):
             found = case.json(f"analysis/error_{name}_state{state}.json")
             x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
-            _error(axes, x, found, place, not case.status(name, state))
+            _error(axes, x, found, look[name], not case.status(name, state))
     low, high = axes[0].get_ylim()
     if high < 20 * low:
         axes[0].yaxis.set_minor_formatter("{x:.2g}")
     handles = [
-        style.line(style.SERIES[n % 6], name, ls="", marker=style.MARKERS[n % 6])
-        for n, name in enumerate(names)
+        style.line(style.SERIES[look[name] % 6], name, ls="", marker=style.MARKERS[look[name] % 6])
+        for name in names
     ]
     handles.append(style.line("#555555", "p95 / along the strut", ls="", marker="_"))
     handles.append(style.line(style.RED, "failed or not converged", ls="", marker="x"))
