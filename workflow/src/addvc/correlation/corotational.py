@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from addvc.correlation.gauss_newton import Solution
-from addvc.correlation.metric import Reference, geman_mcclure, hessian, residual, turned, weighted
+from addvc.correlation.metric import Reference, hessian, turned
 from addvc.correlation.register import Stop, System, register
 from addvc.fem.assembly import node_pattern
 from addvc.fem.operators import corotational_load, stiffness
@@ -44,20 +44,20 @@ class Problem:
     smoothing: int = 4
 
 
-def stage_system(problem: Problem, stage: Stage, deformed: np.ndarray, u: np.ndarray) -> System:
-    """The system of a stage that starts from u (n, 3): rotations and robust weights of A from u."""
+def stage_system(problem: Problem, stage: Stage, u: np.ndarray) -> System:
+    """The system of a stage that starts from u (n, 3), with the rotations of u.
+
+    H has no robust weights: they only fall from one, so that A then bounds the curvature from above
+    and each step goes down. With the weights of u in H, points whose residual fell during the stage
+    were stepped over back and forth."""
     mesh, pattern = problem.reference.mesh, node_pattern(problem.reference.mesh)
     rotation = smooth_rotations(mesh, u, problem.smoothing) if stage.rotated else None
     reference, load = problem.reference, None
     if rotation is not None:
         reference = turned(reference, rotation)
         load = problem.weight * corotational_load(mesh, problem.nu, rotation)
-    trusted = reference
-    if stage.scale is not None:
-        r, _ = residual(reference, deformed, u)
-        trusted = weighted(reference, geman_mcclure(r, stage.scale))
     energy = problem.weight * stiffness(mesh, problem.nu, pattern, rotation)
-    factor = factorise(hessian(trusted, pattern) + energy, problem.order)
+    factor = factorise(hessian(reference, pattern) + energy, problem.order)
     return System(reference, energy, factor, load, stage.scale)
 
 
@@ -70,7 +70,7 @@ def corotational(
     for each stage."""
     history, rows, seconds = [], [], 0.0
     for number, stage in enumerate(stages, 1):
-        system = stage_system(problem, stage, deformed, u)
+        system = stage_system(problem, stage, u)
         solution = register(system, deformed, u, stage.stop, f"micro DVC, stage {number}")
         u, seconds = solution.u, seconds + solution.seconds
         history += solution.history

@@ -38,12 +38,6 @@ def turned(reference: Reference, rotation: np.ndarray) -> Reference:
     return replace(reference, gradient=gradient.astype(reference.gradient.dtype))
 
 
-def weighted(reference: Reference, factor: np.ndarray) -> Reference:
-    """The same points with their weights multiplied by factors (Q,)."""
-    q = reference.quadrature
-    return replace(reference, quadrature=replace(q, weight=q.weight * factor))
-
-
 def geman_mcclure(r: np.ndarray, scale: float) -> np.ndarray:
     """Weights (Q,) of iteratively reweighted least squares for rho(r) = r^2 / (1 + (r / s)^2)
     [Geman & McClure 1987]: 1 for small residuals, 1/4 at r = s, nothing far beyond."""

@@ -1,0 +1,148 @@
+"""Corotational micro DVC on a small frame of struts whose motion is known."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from addvc.correlation.corotational import Problem, Stage, corotational
+from addvc.correlation.micro import elastic, micro_options, micro_reference, stages
+from addvc.correlation.register import Stop
+from addvc.fem.shell import shell_points
+from addvc.geometry.stuffing import stuff
+
+SHAPE = (44, 44, 44)
+CENTRE = np.full(3, 21.5)
+CORNERS = CENTRE + 11 * np.array(
+    [[-1, -1, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1], [0.2, -0.1, 0.1]]
+)
+STRUTS = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)]
+SECTION = {"l_k": "auto", "l_l": "auto", "l_e": "auto", "period": 35, "nu": 0.28}
+LAST = Stop(1e-4, 40)
+
+
+def frame(points):
+    """Grey levels of struts of radius 1.4, 20 in the void and 110 inside, at points (n, 3)."""
+    away = np.full(len(points), np.inf)
+    for a, b in STRUTS:
+        along = CORNERS[b] - CORNERS[a]
+        t = np.clip((points - CORNERS[a]) @ along / (along @ along), 0, 1)
+        away = np.minimum(away, np.linalg.norm(points - CORNERS[a] - t[:, None] * along, axis=1))
+    return 20 + 90 / (1 + np.exp((away - 1.4) / 0.35))
+
+
+def image(back, seed=None):
+    """The frame moved: the voxel at x shows what was at back(x); noise of 1.5 with a seed."""
+    voxels = np.stack(np.meshgrid(*map(np.arange, SHAPE), indexing="ij"), -1).reshape(-1, 3)
+    grey = frame(back(voxels.astype(float))).reshape(SHAPE)
+    if seed is not None:
+        grey += np.random.default_rng(seed).normal(scale=1.5, size=SHAPE)
+    return grey.astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def still():
+    return image(lambda x: x, 2417)
+
+
+@pytest.fixture(scope="module")
+def problem(still):
+    mesh = stuff(still, 60.0, 1.6)
+    reference = micro_reference(mesh, still, shell_points(mesh, still, 60.0))
+    options = micro_options(SECTION, 20.0, 1)
+    return Problem(reference, elastic(reference, options)[2]["c"], options.nu)
+
+
+def turned_by(degrees):
+    """A rigid turn about an oblique axis: u at points, and where a voxel comes from."""
+    axis = np.array([1.0, 2.0, -1.0]) / np.sqrt(6)
+    rotation = Rotation.from_rotvec(np.radians(degrees) * axis).as_matrix()
+    return (
+        lambda x: (x - CENTRE) @ rotation.T + CENTRE - x,
+        lambda x: (x - CENTRE) @ rotation + CENTRE,
+    )
+
+
+def rms_error(u, truth):
+    return float(np.sqrt(np.mean(np.sum((u - truth) ** 2, axis=1))))
+
+
+def test_no_motion_is_no_motion(problem, still):
+    still_u = np.zeros_like(problem.reference.mesh.points)
+    solution, _ = corotational(problem, still, still_u, [Stage(True, 15.0, LAST)])
+    assert solution.converged and solution.iterations == 1
+    np.testing.assert_array_equal(solution.u, 0)
+
+
+@pytest.mark.parametrize("degrees", [5, 20, 40])
+def test_a_large_turn_costs_no_energy(problem, degrees):
+    """From half a voxel off, to a tenth of the blur of the edges, whatever the angle."""
+    forth, back = turned_by(degrees)
+    points = problem.reference.mesh.points
+    truth = forth(points)
+    wave = 0.5 * np.sin(2 * np.pi * points[:, [1, 2, 0]] / 30)
+    plan = [Stage(True, 15.0, Stop(1e-2, 10)), Stage(True, 15.0, LAST)]
+    solution, rows = corotational(problem, image(back, 31), truth + wave, plan)
+    assert solution.converged
+    assert rms_error(solution.u, truth) < 0.06 < rms_error(truth + wave, truth) / 5
+    assert len(solution.history) == sum(row["iterations"] for row in rows)
+
+
+def test_without_rotation_a_large_turn_is_an_error(problem):
+    forth, back = turned_by(40)
+    truth, deformed = forth(problem.reference.mesh.points), image(back, 31)
+    error = {}
+    for rotated in (True, False):
+        plan = [Stage(rotated, 15.0, LAST)]
+        error[rotated] = rms_error(corotational(problem, deformed, truth, plan)[0].u, truth)
+    assert error[False] > 3 * error[True]
+
+
+def test_robust_weights_leave_out_what_the_reference_does_not_show(problem):
+    """Something bright comes to lie against a strut in the deformed image only."""
+    points = problem.reference.mesh.points
+    deformed = image(lambda x: x, 31)
+    beside = (CORNERS[0] + CORNERS[1]) / 2 + [0, 3, 0]
+    voxels = np.moveaxis(np.indices(SHAPE), 0, -1) - beside
+    deformed += (90 * np.exp(-((voxels**2).sum(-1)) / 6)).astype(np.float32)
+    near = np.linalg.norm(points - beside, axis=1) < 5
+    error = {}
+    for scale in (15.0, None):
+        solution, _ = corotational(problem, deformed, 0 * points, [Stage(True, scale, LAST)])
+        error[scale] = rms_error(solution.u[near], 0)
+    assert error[15.0] < 0.5 * error[None]
+
+
+def test_the_shell_brings_the_error_down(problem, still):
+    """Twice the flanks: less noise in the position of a strut."""
+    mesh = problem.reference.mesh
+    bare = micro_reference(mesh, still)
+    c = elastic(bare, micro_options(SECTION, 20.0, 1))[2]["c"]
+    forth, back = turned_by(5)
+    truth = forth(mesh.points)
+    error = []
+    for given in (problem, Problem(bare, c, problem.nu)):
+        found = [
+            corotational(given, image(back, seed), truth, [Stage(True, None, LAST)])[0].u
+            for seed in (31, 32, 33)
+        ]
+        error.append(np.mean([rms_error(u, truth) for u in found]))
+    assert error[0] < error[1]
+
+
+def test_the_scale_follows_the_noise_but_not_below_a_third_of_the_contrast():
+    section = {
+        "robust": "auto",
+        "rotated": True,
+        "stages": 3,
+        "tolerance": 1e-3,
+        "max_iterations": 40,
+    }
+    levels = {"void": 20.0, "solid": 80.0, "noise": 4.0}
+    plan = stages(section, levels)
+    assert [stage.scale for stage in plan] == [36.0] * 3
+    assert [stage.stop for stage in plan] == [Stop(1e-2, 10)] * 2 + [Stop(1e-3, 40)]
+    assert stages(section, levels | {"noise": 0.0})[0].scale == 20.0
+    assert stages(section | {"robust": 12}, levels)[0].scale == 12.0
+    assert stages(section | {"robust": "none"}, levels)[0].scale is None
+    assert stages(section, levels, "without_robust")[0].scale is None
+    assert not stages(section, levels, "without_rotation")[0].rotated
