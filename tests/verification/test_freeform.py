@@ -151,6 +151,14 @@ def test_a_smooth_field_is_found(speckle):
     assert left < 0.02
 
 
+def test_threads_change_nothing(speckle, with_one_and_two_threads):
+    volume = speckle((30, 32, 28))
+    deformed = fft_shift(volume, (0.3, -0.4, 0.6))
+    one, two = with_one_and_two_threads(lambda: freeform(volume, deformed, OPTIONS)[1])
+    assert_array_equal(one.u, two.u)
+    assert one.history == two.history
+
+
 def test_platens_give_the_compression_to_begin_with(rng):
     """Faces at 9.5 and 49.5, then at 9.5 and 41.5: between them an affine field, rigid beyond."""
     images = []
