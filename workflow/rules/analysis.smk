@@ -203,7 +203,7 @@ rule noise_draws:
     params:
         code=code("analysis/noise_draws.py"),
         blur=config["images"]["blur"],
-        method=settings.micro_names(config)[MICRO[0]],
+        method=METHODS[MICRO[0]],
     script:
         "../scripts/analysis/noise_draws.py"
 
