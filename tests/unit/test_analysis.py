@@ -7,13 +7,8 @@ from addvc.analysis.fields import by_owner, result_fields
 from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_residual
 from addvc.analysis.summary import costs
 from addvc.analysis.truth import error_statistics, errors_at, load_truth
-from addvc.analysis.validity import (
-    nodal_residual,
-    nodal_square,
-    residual_limit,
-    valid_nodes,
-    verdict,
-)
+from addvc.analysis.validity import nodal_residual, valid_nodes, verdict
+from addvc.correlation.doubt import nodal_square, residual_limit
 from addvc.correlation.metric import Reference
 from addvc.fem.mesh import Mesh
 from addvc.fem.quadrature import gauss_points

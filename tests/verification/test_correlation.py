@@ -288,7 +288,7 @@ def struts(foam):
     region = micro_region(specimen, {"low": 22, "high": 62, "radius": 18.0})
     mesh, _ = largest_piece(stuff(capped(smooth, gamma, region, contrast), gamma, 1.6))
     penalised = node_classes(mesh, region, "penalised")["penalised"] > 0
-    options = MicroOptions(AXIS, l_k=28.0, l_l=28.0, period=35.0)
+    options = MicroOptions(AXIS, l_k=28.0, l_l=28.0, l_e=22.0, period=35.0)
     reference = micro_reference(mesh, smooth)
     a, extra, _ = eq10(reference, penalised, options)
     field = VirtualField((0.01,), AXIS, low=42.0, amplitude=0.5, wavelength=90.0)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addvc.correlation.corotational import Problem, Stage, corotational
+from addvc.correlation.corotational import Mending, Problem, Stage, corotational
+from addvc.correlation.doubt import doubtful_nodes, without
 from addvc.correlation.micro import elastic, micro_options, micro_reference, stages
 from addvc.correlation.register import Stop
 from addvc.fem.shell import shell_points
@@ -127,6 +128,48 @@ def test_the_shell_brings_the_error_down(problem, still):
         ]
         error.append(np.mean([rms_error(u, truth) for u in found]))
     assert error[0] < error[1]
+
+
+def off_course(points, truth):
+    """The truth but for the middle of one strut, which is 8 voxels off."""
+    middle = (CORNERS[1] + CORNERS[2]) / 2
+    bump = np.exp(-np.sum((points - middle) ** 2, axis=1) / (2 * 5.0**2))
+    return truth + 8 * bump[:, None] * np.array([0.0, 0.6, 0.8])
+
+
+def test_a_strut_that_went_astray_is_mended(problem):
+    forth, back = turned_by(20)
+    points = problem.reference.mesh.points
+    truth, deformed = forth(points), image(back, 31)
+    start = off_course(points, truth)
+    plan = [Stage(True, 15.0, Stop(1e-2, 10)), Stage(True, 15.0, LAST)]
+    lost, _ = corotational(problem, deformed, start, plan)
+    found, rows = corotational(problem, deformed, start, plan, Mending(3, 4.0))
+    assert rms_error(lost.u, truth) > 0.2
+    assert rms_error(found.u, truth) < 0.06
+    assert found.converged
+    assert [row["stage"] for row in rows][1:3] == ["carried", "carried"]
+
+
+def test_nothing_is_mended_where_nothing_is_in_doubt(problem, still):
+    start = np.zeros_like(problem.reference.mesh.points)
+    solution, rows = corotational(problem, still, start, [Stage(True, 15.0, LAST)], Mending(3, 4.0))
+    assert len(rows) == 1
+    np.testing.assert_array_equal(solution.u, 0)
+
+
+def test_doubt_lies_where_the_displacement_is_wrong(problem):
+    forth, back = turned_by(20)
+    points = problem.reference.mesh.points
+    truth, deformed = forth(points), image(back, 31)
+    assert not doubtful_nodes(problem.reference, deformed, truth, 6.0).any()
+    start = off_course(points, truth)
+    doubtful = doubtful_nodes(problem.reference, deformed, start, 6.0)
+    away = np.linalg.norm(start - truth, axis=1)
+    assert doubtful[away > 3].all() and not doubtful[away < 1e-3].any()
+    left = without(problem.reference, doubtful).quadrature.weight
+    dropped = left < problem.reference.quadrature.weight
+    assert (left[dropped] == 0).all() and 0 < dropped.mean() < 0.5
 
 
 def test_the_scale_follows_the_noise_but_not_below_a_third_of_the_contrast():

@@ -141,7 +141,14 @@ rule micro_dvc:
         code=code("micro/micro_dvc.py"),
         method=method_of,
         micro=section(
-            "micro", "tolerance", "max_iterations", "nu", "robust", "rotated", "stages"
+            "micro",
+            "tolerance",
+            "max_iterations",
+            "nu",
+            "robust",
+            "rotated",
+            "stages",
+            "mending",
         ),
     script:
         "../scripts/micro/micro_dvc.py"

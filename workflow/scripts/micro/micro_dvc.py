@@ -1,7 +1,7 @@
 """Micro DVC of one state by one method, from the best start on the micro mesh."""
 
 from addvc.correlation.corotational import Problem, corotational
-from addvc.correlation.micro import micro_reference, shell_of, stages
+from addvc.correlation.micro import mending, micro_reference, shell_of, stages
 from addvc.correlation.register import Stop, System, register
 from addvc.correlation.store import load_factor, load_field, load_order, save_solution
 from addvc.fem.io import read_mesh
@@ -22,6 +22,7 @@ with job(snakemake):
     else:
         order, notes = load_order(source.factor)
         problem = Problem(reference, notes["c"], micro["nu"], order)
-        plan = stages(micro, read_json(source.threshold), method)
-        solution, notes["stages"] = corotational(problem, deformed, start, plan)
+        levels = read_json(source.threshold)
+        plan = stages(micro, levels, method), mending(micro, levels)
+        solution, notes["stages"] = corotational(problem, deformed, start, *plan)
     save_solution(snakemake.output[0], solution, **notes)

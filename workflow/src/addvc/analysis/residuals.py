@@ -5,7 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from addvc.analysis.validity import nodal_square
+from addvc.correlation.doubt import nodal_square
 from addvc.correlation.metric import Reference, residual, residual_statistics
 from addvc.images.files import atomic_path
 

@@ -5,14 +5,22 @@ energy of each tetrahedron measured from its own rotation R, so that a strut tha
 costs nothing; the gradient R grad I_r. R is smoothed and frozen within a stage: a stage then is the
 modified Gauss-Newton of Eq. 3, with one factor, of the sparsity of K. A stage is data, and micro
 DVC a fold over stages.
+
+At large strain a few struts start too far off and fall into the wrong minimum: their residual tells.
+`mended` lets go of them: without their points they go where the struts they hang on carry them, then
+look at the image again, with wider weights first. What is still in doubt does not count in the last
+stage, which then settles. On the twin at 28.5 % (seed 2417): nodes within 1 voxel 98.45 % without
+mending, then 98.50, 98.58, 98.82 and 99.39 % after one to four cycles, rms error 1.37, .86, .68, .54
+and .43 voxel; 35 CPU-s a cycle.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from addvc.correlation.doubt import doubtful_nodes, without
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.metric import Reference, hessian, turned
 from addvc.correlation.register import Stop, System, register
@@ -22,6 +30,9 @@ from addvc.fem.rotations import smooth_rotations
 from addvc.fem.solver import factorise
 
 log = logging.getLogger(__name__)
+
+EARLY = 10
+"""Tolerance of a stage that is not the last, over that of the last."""
 
 
 @dataclass(frozen=True)
@@ -61,27 +72,80 @@ def stage_system(problem: Problem, stage: Stage, u: np.ndarray) -> System:
     return System(reference, energy, factor, load, stage.scale)
 
 
+@dataclass(frozen=True)
+class Mending:
+    """How often struts are let go, and from which rms residual on (grey levels); the share of the
+    nodes below which that is not worth a cycle."""
+
+    cycles: int
+    limit: float
+    least: float = 1e-3
+
+
 def corotational(
-    problem: Problem, deformed: np.ndarray, u: np.ndarray, stages: Sequence[Stage]
+    problem: Problem,
+    deformed: np.ndarray,
+    u: np.ndarray,
+    stages: Sequence[Stage],
+    mending: Mending | None = None,
 ) -> tuple[Solution, list[dict]]:
     """Stages one after the other from u (n, 3); I_d by its spline coefficients (nx, ny, nz).
 
-    The solution has the history of all stages and converged if the last one did; a row of figures
-    for each stage."""
-    history, rows, seconds = [], [], 0.0
-    for number, stage in enumerate(stages, 1):
-        system = stage_system(problem, stage, u)
-        solution = register(system, deformed, u, stage.stop, f"micro DVC, stage {number}")
-        u, seconds = solution.u, seconds + solution.seconds
-        history += solution.history
-        rows.append(
-            {
-                "rotated": stage.rotated,
-                "scale": stage.scale,
-                "iterations": solution.iterations,
-                "converged": solution.converged,
-                "residual_std": solution.residual["std"],
-                "factor_nonzeros": system.factor.nonzeros,
-            }
-        )
-    return replace(solution, history=history, seconds=seconds), rows
+    Mending comes before the last stage. The solution has the history of all stages and converged if
+    the last one did; a row of figures for each stage."""
+    *early, last = stages
+    done: list[tuple[Solution, dict]] = []
+    for stage in early:
+        done.append(run(problem, stage, deformed, u))
+        u = done[-1][0].u
+    if mending is not None:
+        for step in mended(problem, deformed, u, last, mending):
+            done.append(step)
+            u = step[0].u
+        doubtful = doubtful_nodes(problem.reference, deformed, u, mending.limit)
+        problem = replace(problem, reference=without(problem.reference, doubtful))
+    done.append(run(problem, last, deformed, u))
+    solutions, rows = zip(*done, strict=True)
+    history = [step for solution in solutions for step in solution.history]
+    seconds = sum(solution.seconds for solution in solutions)
+    return replace(solutions[-1], history=history, seconds=seconds), list(rows)
+
+
+def run(
+    problem: Problem, stage: Stage, deformed: np.ndarray, u: np.ndarray, name: str = "micro DVC"
+) -> tuple[Solution, dict]:
+    """One stage from u (n, 3), and its row of figures."""
+    system = stage_system(problem, stage, u)
+    solution = register(system, deformed, u, stage.stop, name)
+    return solution, {
+        "stage": name,
+        "rotated": stage.rotated,
+        "scale": stage.scale,
+        "points": int(np.count_nonzero(system.reference.quadrature.weight)),
+        "iterations": solution.iterations,
+        "converged": solution.converged,
+        "residual_std": solution.residual["std"],
+        "factor_nonzeros": system.factor.nonzeros,
+    }
+
+
+def mended(
+    problem: Problem, deformed: np.ndarray, u: np.ndarray, last: Stage, mending: Mending
+) -> Iterator[tuple[Solution, dict]]:
+    """The stages of the cycles of mending: twice carried, then with all points, wide and narrow."""
+    short = replace(last, stop=Stop(EARLY * last.stop.tolerance, 10))
+    wide = replace(short, scale=None if last.scale is None else 2 * last.scale)
+    for _ in range(mending.cycles):
+        doubtful = doubtful_nodes(problem.reference, deformed, u, mending.limit)
+        if doubtful.mean() < mending.least:
+            return
+        log.info("micro DVC: %.2f %% of the nodes are let go", 100 * doubtful.mean())
+        carried = replace(problem, reference=without(problem.reference, doubtful))
+        plan = [(carried, short, "carried")] * 2 + [
+            (problem, wide, "wide"),
+            (problem, short, "narrow"),
+        ]
+        for given, stage, name in plan:
+            step = run(given, stage, deformed, u, name)
+            u = step[0].u
+            yield step

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from addvc.correlation.corotational import Stage
+from addvc.correlation.corotational import EARLY, Mending, Stage
+from addvc.correlation.doubt import residual_limit
 from addvc.correlation.metric import Reference, hessian, reference_on
 from addvc.correlation.register import Stop
 from addvc.correlation.regularisation import elastic_weight, equilibrium_gap
@@ -106,6 +107,11 @@ def stages(section: dict, levels: dict, method: str = "corotational") -> list[St
         scale = max(9 * levels["noise"], (levels["solid"] - levels["void"]) / 3)
     scale = None if scale == "none" or method == "without_robust" else float(scale)
     last = Stop(section["tolerance"], section["max_iterations"])
-    early = Stop(10 * last.tolerance, min(10, last.max_iterations))
+    early = Stop(EARLY * last.tolerance, min(10, last.max_iterations))
     ends = [early] * (section["stages"] - 1) + [last]
     return [Stage(rotated, scale, end) for end in ends]
+
+
+def mending(section: dict, levels: dict) -> Mending:
+    """Cycles of mending from the `micro` section, the limit from the noise of the grey `levels`."""
+    return Mending(section["mending"], residual_limit(levels["noise"]))
