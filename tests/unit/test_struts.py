@@ -29,7 +29,7 @@ from addvc.analysis.strut_table import (
     strut_table,
 )
 from addvc.analysis.struts import Strut, partition
-from addvc.analysis.struts_truth import BEAMS, FIELD, judged, unloaded
+from addvc.analysis.struts_truth import BEAMS, FIELD, flags, judged, unloaded
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.skeleton import FREE_END, Branch, kinks, simplified, strut_graph
 from addvc.images.files import write_json
@@ -552,13 +552,29 @@ def test_the_strut_of_a_figure_is_trusted_only_where_all_results_know_it():
     assert_array_equal(trusted(table, sources), [False, True, False])
 
 
+FLAGS = {"struts": 30, "wrong": 2, "wrong_flagged": 1.0, "right_flagged": 0.0}
+
+
+def test_flags_are_judged_by_the_error_of_the_nodes_of_each_strut(cut, lattice):
+    struts, error = cut[0], np.zeros_like(lattice[2].points)
+    for number in (0, 3):
+        error[struts[number].nodes] = [0, 1.2, 0.9]  # 1.5 voxels
+    valid = [1] * len(struts)
+    valid[0] = valid[1] = 0
+    found = flags(struts, valid, error)
+    assert found["struts"] == len(struts) and found["wrong"] == 2
+    assert found["wrong_flagged"] == 0.5
+    assert found["right_flagged"] == pytest.approx(1 / (len(struts) - 2))
+    assert flags(struts, valid, 0 * error)["wrong_flagged"] is None
+
+
 def test_figures_against_the_truth_become_rows_with_units(tmp_path):
     table = table_of(np.random.default_rng(2417).random((30, 3)))
     names = (*KINDS, "bending_share", "axial_strain", "bending_share_std")
     true = {name + FIELD: table[name] for name in names}
     for state in (1, 2):
         write_json(tmp_path / f"analysis/struts_truth_state{state}.json",
-                   judged(table, true, {"micro": "", "meso9": ""}))  # fmt: skip
+                   judged(table, true, {"micro": "", "meso9": ""}) | {"flags": FLAGS})  # fmt: skip
     labels = {1: "3.4 %", 2: "5.2 %"}
     case = Case.of({"root": tmp_path, "labels": labels, "meso": ["meso9"], "micro": ["micro"]})
     rows = truth_rows(case)
@@ -566,3 +582,4 @@ def test_figures_against_the_truth_become_rows_with_units(tmp_path):
     assert rows[0][4:] == ["3.4 %", "5.2 %"]
     found = next(row for row in rows if row[2] == "correlation of the share of bending")
     assert found[4:] == ["1", "1"]
+    assert next(row for row in rows if row[2] == "of these, flagged")[4:] == ["1", "1"]

@@ -81,6 +81,7 @@ if HAS_TRUTH:
             struts=f"{R}/geometry/struts.h5",
             mesh=f"{R}/geometry/micro.vtu",
             table=f"{R}/struts_state{{state}}.csv",
+            solution=f"{R}/dvc/{MICRO[0]}_state{{state}}.h5",
             truth=TRUTH,
         output:
             table=f"{R}/analysis/struts_truth_state{{state}}.csv",

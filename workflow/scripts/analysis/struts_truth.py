@@ -2,8 +2,9 @@
 
 from addvc.analysis.strut_store import load_partition, read_columns, write_columns
 from addvc.analysis.strut_table import MESO
-from addvc.analysis.struts_truth import judged, true_columns
+from addvc.analysis.struts_truth import flags, judged, true_columns
 from addvc.analysis.truth import load_truth
+from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import write_json
 from addvc.runtime import job
@@ -15,7 +16,9 @@ with job(snakemake) as log:
     points, nu = read_mesh(source.mesh).points, snakemake.params.nu
     true = true_columns(struts, points, truth, source.truth, state, nu)
     results = dict(zip(names, ("", MESO), strict=True))
-    figures = judged(read_columns(source.table), true, results)
+    table = read_columns(source.table)
+    error = load_field(source.solution) - truth.displacement(points, state)
+    figures = judged(table, true, results) | {"flags": flags(struts, table["valid"], error)}
     log.info("%s", figures)
     write_columns(snakemake.output.table, true)
     write_json(snakemake.output.figures, figures)

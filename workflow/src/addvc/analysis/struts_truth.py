@@ -23,6 +23,9 @@ OVERLAP = 0.9
 LOADED = 1e-3
 """Energy per volume, over the mean, below which a strut carries no load and its share says nothing."""
 
+WRONG = 1.0
+"""Error of a strut, voxels, from which on it should be flagged."""
+
 COMPARED = ("bending_share", "axial_strain")
 FIELD, BEAMS = "_field", "_beams"
 """Added to the names of the columns of both truths."""
@@ -86,6 +89,23 @@ def judged(table: dict, true: dict, results: dict[str, str]) -> dict:
     if "beams" in truths:
         figures["field"] = {"beams": agreement(columns, FIELD, BEAMS, use)}
     return figures
+
+
+def flags(struts: list[Strut], valid: list, error: np.ndarray) -> dict:
+    """How well doubt tells error, over the struts that the threshold has not broken: those whose nodes
+    are off by over `WRONG` voxels (rms of error (n, 3)), and the shares of these and of the others
+    that are not `valid` (one each)."""
+    square = np.sum(error**2, axis=1)
+    whole = [n for n, strut in enumerate(struts) if not strut.broken]
+    off = [np.average(square[struts[n].nodes], weights=struts[n].weight) for n in whole]
+    wrong = np.sqrt(np.array(off, float)) > WRONG
+    flagged = np.array([int(valid[n]) == 0 for n in whole], dtype=bool)
+    return {
+        "struts": len(whole),
+        "wrong": int(wrong.sum()),
+        "wrong_flagged": mean(flagged[wrong]),
+        "right_flagged": mean(flagged[~wrong]),
+    }
 
 
 def agreement(columns: dict, first: str, second: str, use: np.ndarray) -> dict:

@@ -20,6 +20,13 @@ QUANTITIES = {
 }
 
 
+FLAGS = {
+    "wrong": "struts in error by over 1 voxel",
+    "wrong_flagged": "of these, flagged",
+    "right_flagged": "of the others, flagged",
+}
+
+
 def against_truth(case: Case, outputs: Iterable[str]) -> None:
     """Measured against true, a point a valid strut, a column a state: (top) share of bending,
     (bottom) axial strain, of the micro and of the finest meso result."""
@@ -63,6 +70,10 @@ def truth_rows(case: Case) -> list[list[str]]:
     first = read[case.states[0]]
     rows = [["Struts", "Against", "Quantity", "Unit", *(case.labels[n] for n in case.states)]]
     names = {"field": "true displacement", "beams": "beams of the twin"}
+    flags = {n: read[n].pop("flags") for n in case.states}
+    for key, quantity in FLAGS.items():
+        values = [_number(flags[n][key]) for n in case.states]
+        rows.append([case.micro[0], names["field"], quantity, "–", *values])
     for source, others in first.items():
         for other in others:
             found = [read[n][source][other] for n in case.states]
