@@ -109,6 +109,13 @@ def test_closing_lines_tell_the_verdict_of_each_state(one, words):
     assert lines[3].endswith("results/foam/report.html")
 
 
+def test_closing_lines_tell_how_many_struts_are_flagged():
+    struts = {"valid": 341, "flagged": 23, "bending_share": 0.7}
+    lines = closing_lines(summary(GOOD | {"struts": struts}), "results/foam")
+    assert "23 of 364 struts flagged" in lines
+    assert "struts" not in closing_lines(summary(GOOD | {"struts": None}), "results/foam")
+
+
 def test_without_a_truth_no_error_is_told():
     assert "error" not in closing_lines(summary(REAL), "results/foam")
 

@@ -21,6 +21,7 @@ def closing_lines(summary: dict, folder: str) -> str:
             f"  state {state['state']} ({state['strain']:.1%} measured): "
             f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}, "
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
+            + flag_words(state.get("struts"))
             + error_words(found["error"])
         )
     failed = failed_checks(summary)
@@ -29,6 +30,13 @@ def closing_lines(summary: dict, folder: str) -> str:
         lines.append(f"  {count} checks of the synthetic test do not hold: see the report")
     lines.append(f"  open the report: xdg-open {folder}/report.html")
     return "\n".join(lines)
+
+
+def flag_words(struts: dict | None) -> str:
+    """How many struts are flagged: doubtful, broken by the threshold, or not measured."""
+    if not struts:
+        return ""
+    return f", {struts['flagged']} of {struts['valid'] + struts['flagged']} struts flagged"
 
 
 def figure(value: float | None, form: str) -> str:
