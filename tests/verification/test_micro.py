@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from addvc.correlation.corotational import Mending, Problem, Stage, corotational
 from addvc.correlation.doubt import doubtful_nodes, without
-from addvc.correlation.micro import elastic, micro_options, micro_reference, stages
+from addvc.correlation.micro import elastic, mending, micro_options, micro_reference, stages
 from addvc.correlation.register import Stop
 from addvc.fem.shell import shell_points
 from addvc.geometry.stuffing import stuff
@@ -156,6 +156,24 @@ def test_nothing_is_mended_where_nothing_is_in_doubt(problem, still):
     solution, rows = corotational(problem, still, start, [Stage(True, 15.0, LAST)], Mending(3, 4.0))
     assert len(rows) == 1
     np.testing.assert_array_equal(solution.u, 0)
+
+
+@pytest.mark.parametrize("limit", [0.0, 4.0])
+def test_an_image_of_nothing_is_a_result_that_did_not_converge_or_moves_nowhere(problem, limit):
+    """All nodes are in doubt: no one is let go, and the system stays regular."""
+    noise = np.random.default_rng(2417).normal(60, 20, SHAPE).astype(np.float32)
+    start = np.zeros_like(problem.reference.mesh.points)
+    plan = [Stage(True, 15.0, Stop(1e-2, 3)), Stage(True, 15.0, Stop(1e-4, 3))]
+    solution, rows = corotational(problem, noise, start, plan, Mending(2, limit))
+    assert len(rows) == 2 and np.isfinite(solution.u).all()
+    doubtful = doubtful_nodes(problem.reference, noise, solution.u, limit)
+    assert doubtful.mean() > 0.5
+
+
+def test_no_cycles_no_mending():
+    levels = {"noise": 2.0}
+    assert mending({"mending": 0}, levels) is None
+    assert mending({"mending": 3}, levels).cycles == 3
 
 
 def test_doubt_lies_where_the_displacement_is_wrong(problem):

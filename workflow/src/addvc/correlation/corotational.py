@@ -75,11 +75,12 @@ def stage_system(problem: Problem, stage: Stage, u: np.ndarray) -> System:
 @dataclass(frozen=True)
 class Mending:
     """How often struts are let go, and from which rms residual on (grey levels); the share of the
-    nodes below which that is not worth a cycle."""
+    nodes below which that is not worth a cycle, and above which nothing is left to hold on to."""
 
     cycles: int
     limit: float
     least: float = 1e-3
+    most: float = 0.5
 
 
 def corotational(
@@ -91,19 +92,21 @@ def corotational(
 ) -> tuple[Solution, list[dict]]:
     """Stages one after the other from u (n, 3); I_d by its spline coefficients (nx, ny, nz).
 
-    Mending comes before the last stage. The solution has the history of all stages and converged if
-    the last one did; a row of figures for each stage."""
+    Mending comes between the others and the last stage, in which what is then in doubt does not
+    count. The solution has the history of all stages and converged if the last one did; a row of
+    figures for each stage."""
     *early, last = stages
     done: list[tuple[Solution, dict]] = []
     for stage in early:
         done.append(run(problem, stage, deformed, u))
         u = done[-1][0].u
-    if mending is not None:
+    if mending is not None and early:
         for step in mended(problem, deformed, u, last, mending):
             done.append(step)
             u = step[0].u
         doubtful = doubtful_nodes(problem.reference, deformed, u, mending.limit)
-        problem = replace(problem, reference=without(problem.reference, doubtful))
+        if doubtful.mean() < mending.most:
+            problem = replace(problem, reference=without(problem.reference, doubtful))
     done.append(run(problem, last, deformed, u))
     solutions, rows = zip(*done, strict=True)
     history = [step for solution in solutions for step in solution.history]
@@ -137,7 +140,7 @@ def mended(
     wide = replace(short, scale=None if last.scale is None else 2 * last.scale)
     for _ in range(mending.cycles):
         doubtful = doubtful_nodes(problem.reference, deformed, u, mending.limit)
-        if doubtful.mean() < mending.least:
+        if not mending.least <= doubtful.mean() < mending.most:
             return
         log.info("micro DVC: %.2f %% of the nodes are let go", 100 * doubtful.mean())
         carried = replace(problem, reference=without(problem.reference, doubtful))

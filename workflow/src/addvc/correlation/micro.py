@@ -112,6 +112,9 @@ def stages(section: dict, levels: dict, method: str = "corotational") -> list[St
     return [Stage(rotated, scale, end) for end in ends]
 
 
-def mending(section: dict, levels: dict) -> Mending:
-    """Cycles of mending from the `micro` section, the limit from the noise of the grey `levels`."""
+def mending(section: dict, levels: dict) -> Mending | None:
+    """Cycles of mending from the `micro` section, None for 0, the limit from the noise of the grey
+    `levels`."""
+    if section["mending"] == 0:
+        return None
     return Mending(section["mending"], residual_limit(levels["noise"]))
