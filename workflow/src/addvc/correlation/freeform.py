@@ -1,4 +1,4 @@
-"""Free-form DVC: a displacement on a cubic B-spline grid, found from rest, coarse to fine.
+"""Free-form DVC: a displacement on a cubic B-spline grid, found without a start, coarse to fine.
 
 No mesh and no mechanics: the grid covers the whole image with what it shows of the platens, whose
 faces in both images give the affine field to begin with. Each level has a grid and a blur. The

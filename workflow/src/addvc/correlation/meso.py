@@ -1,8 +1,8 @@
 """Section 3.2: meso DVC, from a start found over a pyramid of binned images to the finest mesh.
 
-Two candidate starts: `zero` (u = 0, then the pyramid on the coarsest tetrahedra) and `platens` (the
-pyramid on a hexahedral grid that reaches into the platens). Either is rescaled on the coarsest
-mesh by Eq. 6, 7; the better, by sigma(r) after a short correlation, is kept.
+Candidate starts: `zero` (u = 0, then the pyramid on the coarsest tetrahedra), `platens` (the pyramid
+on a hexahedral grid that reaches into the platens) and `freeform` (`correlation.freeform`). Each is
+rescaled on the coarsest mesh by Eq. 6, 7; the best, by sigma(r) after a short correlation, is kept.
 """
 
 import logging
