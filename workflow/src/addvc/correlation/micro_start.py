@@ -1,6 +1,7 @@
 """Where micro DVC starts: the candidate with the least residual and elastic energy.
 
-Close to what the default method minimises (without the shell), and the same for every method. The score of a displacement on the micro mesh is, over the volume V of the mesh,
+Close to what the default method minimises, but without the shell, and the same for every method. The
+score of a displacement on the micro mesh is, over the volume V of the mesh,
 
     (sum w rho(r) + c (v^T K v)(u)) / V,
 

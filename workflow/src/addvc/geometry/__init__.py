@@ -1,4 +1,4 @@
-"""From the image to meshes: cell size, threshold, surface, tetrahedra, meso meshes, grid, regions, skeleton.
+"""From the image to meshes: cell size, threshold, surface, tetrahedra, meso meshes, grid, skeleton.
 
 May import `images`, `fem` and `errors`. Fig. 4 to 9 of the paper.
 """
