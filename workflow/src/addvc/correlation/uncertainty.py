@@ -1,7 +1,8 @@
 """What the noise of the images does to a displacement, known before any deformed image is.
 
 Linearised about rest, without robust weights, u = A^-1 b with b the right-hand side of the noise
-alone, that of both images. Where the noise is white at the points of the quadrature, cov(b) = 2 sigma^2 H and
+alone, that of both images. Where the noise is white at the points of the quadrature,
+cov(b) = 2 sigma^2 H and
 
     cov(u) = 2 sigma^2 A^-1 H A^-1        (Leclerc, Perie, Roux, Hild: Exp. Mech. 52, 2012)
 
