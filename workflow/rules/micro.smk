@@ -54,11 +54,7 @@ rule micro_start:
             "l_e",
             "period",
             "nu",
-            "tolerance",
-            "max_iterations",
             "robust",
-            "rotated",
-            "stages",
         ),
         axis=AXIS,
     script:

@@ -1,6 +1,6 @@
 """The candidate start of micro DVC with the least score, by residual and energy."""
 
-from addvc.correlation.micro import micro_options, micro_reference, stages
+from addvc.correlation.micro import micro_options, micro_reference, robust_scale
 from addvc.correlation.micro_start import best_candidate, judge
 from addvc.correlation.store import load_field, save_field
 from addvc.fem.io import read_mesh
@@ -12,7 +12,7 @@ with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params
     cell = read_json(source.cell_size)["cell_size"]
     options = micro_options(params.micro, cell, params.axis)
-    scale = stages(params.micro, read_json(source.threshold))[-1].scale
+    scale = robust_scale(params.micro["robust"], read_json(source.threshold))
     reference = micro_reference(read_mesh(source.mesh), load_volume(source.reference)[0])
     starts = dict(zip(params.names, map(load_field, source.candidates), strict=True))
     deformed = load_volume(source.deformed)[0]

@@ -54,16 +54,20 @@ def drawn(system: System, at_points: Callable[[], np.ndarray], draws: int) -> It
         yield system.factor.solve(right_hand_side(reference, r)).reshape(-1, 3)
 
 
+def of_two_images(
+    system: System, shape: tuple[int, int, int], noise: Noise
+) -> Callable[[], np.ndarray]:
+    """Draws of the residual (Q,) that the noise of two images of `shape` makes (grey levels)."""
+    rng, points = np.random.default_rng(SEED), system.reference.quadrature.points
+    return lambda: np.sqrt(2) * spline_value(noise.volume(shape, rng), points)[0]
+
+
 def fields_of_noise(
     system: System, shape: tuple[int, int, int], noise: Noise, draws: int = 2 * DRAWS
 ) -> np.ndarray:
     """Displacements (d, n, 3), float32 voxels, by the noise of two images of `shape`: they hold what
     the uncertainty of a node does not, how the errors of neighbours go together."""
-    rng, points = np.random.default_rng(SEED), system.reference.quadrature.points
-
-    def at_points():
-        return np.sqrt(2) * spline_value(noise.volume(shape, rng), points)[0]
-
+    at_points = of_two_images(system, shape, noise)
     return np.stack([u.astype(np.float32) for u in drawn(system, at_points, draws)])
 
 
@@ -71,10 +75,7 @@ def a_priori(
     system: System, shape: tuple[int, int, int], noise: Noise, draws: int = DRAWS
 ) -> np.ndarray:
     """Standard uncertainty (n, 3), voxels, from the noise of two images of `shape`."""
-    rng, points = np.random.default_rng(SEED), system.reference.quadrature.points
-    return of_noise(
-        system, lambda: np.sqrt(2) * spline_value(noise.volume(shape, rng), points)[0], draws
-    )
+    return of_noise(system, of_two_images(system, shape, noise), draws)
 
 
 def a_priori_white(system: System, sigma: float, draws: int = DRAWS) -> np.ndarray:

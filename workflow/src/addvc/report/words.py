@@ -122,29 +122,7 @@ def strut_words(struts: dict | None) -> str:
 
 def warnings(summary: dict) -> list[str]:
     """What to distrust; "None." when there is nothing, so that the section is never silently empty."""
-    found = []
-    for state in summary["states"]:
-        for mesh in summary["meshes"]:
-            one = state[mesh]
-            if not one["converged"]:
-                found.append(
-                    f"- State {state['state']}, {mesh}: the loop did not end in "
-                    f"{one['iterations']} iterations (last rms(du) {figure(one['last_step'], '.1e')} "
-                    "voxel). Look at the residual maps (Fig. 13); a longer "
-                    "regularisation length or a better start may help."
-                )
-        doubtful = 1 - state[micro_name(summary)]["valid_nodes"]
-        if state["verdict"] == "flagged" and doubtful > 0.05:
-            found.append(
-                f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
-                "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
-                "look at the residual maps (Fig. 13)."
-            )
-        if state["verdict"] == "failed":
-            found.append(
-                f"- State {state['state']} could not be registered: at least half of its nodes "
-                "have a residual far above the noise of the images."
-            )
+    found = [line for state in summary["states"] for line in state_warnings(state, summary)]
     micro = summary["meshes"][micro_name(summary)]
     kept = micro["kept_fraction"] * micro["voxel_kept_fraction"]
     if kept < 0.9:
@@ -163,6 +141,33 @@ def warnings(summary: dict) -> list[str]:
         for check in failed_checks(summary)
     ]
     return found or ["None."]
+
+
+def state_warnings(state: dict, summary: dict) -> list[str]:
+    """What to distrust of one state: loops that did not end, nodes in doubt, a failure."""
+    found = []
+    for mesh in summary["meshes"]:
+        one = state[mesh]
+        if not one["converged"]:
+            found.append(
+                f"- State {state['state']}, {mesh}: the loop did not end in "
+                f"{one['iterations']} iterations (last rms(du) {figure(one['last_step'], '.1e')} "
+                "voxel). Look at the residual maps (Fig. 13); a longer "
+                "regularisation length or a better start may help."
+            )
+    doubtful = 1 - state[micro_name(summary)]["valid_nodes"]
+    if state["verdict"] == "flagged" and doubtful > 0.05:
+        found.append(
+            f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
+            "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
+            "look at the residual maps (Fig. 13)."
+        )
+    if state["verdict"] == "failed":
+        found.append(
+            f"- State {state['state']} could not be registered: at least half of its nodes "
+            "have a residual far above the noise of the images."
+        )
+    return found
 
 
 def failed_checks(summary: dict) -> list[dict]:
