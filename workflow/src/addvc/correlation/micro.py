@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from addvc.correlation.corotational import EARLY, Mending, Stage
+from addvc.correlation.corotational import Mending, Stage, early
 from addvc.correlation.doubt import residual_limit
 from addvc.correlation.metric import Reference, hessian, reference_on
 from addvc.correlation.register import Stop
@@ -108,13 +108,11 @@ def robust_scale(setting: str | float, levels: dict) -> float | None:
 
 def stages(section: dict, levels: dict, method: str = "corotational") -> list[Stage]:
     """Stages of micro DVC from the `micro` section of a configuration and the grey `levels` of the
-    threshold (void, solid, noise); all but the last end at ten times the tolerance or after ten
-    iterations: their rotations are not the last ones."""
+    threshold (void, solid, noise); all but the last end early (`correlation.corotational.early`)."""
     rotated = section["rotated"] and method != "without_rotation"
     scale = None if method == "without_robust" else robust_scale(section["robust"], levels)
     last = Stop(section["tolerance"], section["max_iterations"])
-    early = Stop(EARLY * last.tolerance, min(10, last.max_iterations))
-    ends = [early] * (section["stages"] - 1) + [last]
+    ends = [early(last)] * (section["stages"] - 1) + [last]
     return [Stage(rotated, scale, end) for end in ends]
 
 
