@@ -43,11 +43,13 @@ def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
     sizes give median errors of .13 / .10 / .09 voxel at 3.4 %. Where a cell has many voxels
     (trabecular bone: 84) the noise, not the cell, asks for smoothing, and less of it: 20 / 56 / 168
     voxels gave .06 / .10 / .22 voxel on a wavy field. "auto" of l_E: 0.8 cell size, at most 0.7
-    periods."""
+    periods. `times`, where given: factors on some of them (`addvc.studies`)."""
     longest = min(2 * cell_size, 1.6 * section["period"])
     auto = {"l_k": longest, "l_l": longest, "l_e": min(0.8 * cell_size, 0.7 * section["period"])}
+    times = section.get("times", {})
     lengths = {
-        key: value if section[key] == "auto" else float(section[key]) for key, value in auto.items()
+        key: times.get(key, 1.0) * (value if section[key] == "auto" else float(section[key]))
+        for key, value in auto.items()
     }
     return MicroOptions(axis=axis, **lengths, period=float(section["period"]), nu=section["nu"])
 
