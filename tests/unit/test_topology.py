@@ -10,15 +10,16 @@ from addvc.analysis.topology import (
     APART,
     Moved,
     contacts,
-    dangling_stubs,
     mesh_edges,
     necks,
     stretch,
     topology,
     welds,
 )
+from addvc.fem.mesh import cell_volumes, check_mesh
 from addvc.fem.rotations import nearest_rotation
 from addvc.geometry.skeleton import FREE_END, strut_graph
+from addvc.geometry.stubs import dangling_stubs, pruned
 from addvc.geometry.stuffing import stuff
 from addvc.images.files import write_json
 from addvc.report import topology as pictures
@@ -67,6 +68,25 @@ def test_without_cuts_every_end_is_a_stub(frame):
     assert len(dangling_stubs(graph, mesh, np.zeros_like(cut))) == 4
     gaps = [s["nearest"] for s in dangling_stubs(graph, mesh, np.zeros_like(cut))]
     assert min(gaps) == pytest.approx(np.hypot(14, 16), abs=5)
+
+
+def test_pruning_takes_the_stub_and_nothing_else(frame):
+    mesh, graph, cut, _ = frame
+    rest, count = pruned(mesh, graph, cut)
+    check_mesh(rest, "pruned")
+    assert count == 1
+    assert rest.points[:, 1].max() == pytest.approx(MIDDLE[1] + 2, abs=2)
+    lost = cell_volumes(mesh).sum() - cell_volumes(rest).sum()
+    assert lost == pytest.approx(np.pi * 4 * (TIP - MIDDLE)[1], rel=0.25)
+    ends = set(map(tuple, mesh.points[cut]))
+    assert ends <= set(map(tuple, rest.points))
+
+
+def test_pruning_a_mesh_without_stubs_changes_nothing(frame):
+    mesh, graph, _, _ = frame
+    rest, count = pruned(mesh, graph, np.ones(len(mesh.points), bool))
+    assert count == 0
+    np.testing.assert_array_equal(rest.cells, mesh.cells)
 
 
 def strut(area, ends=(0, 1)):

@@ -114,6 +114,7 @@ if STATES:
             solid=given("solid"),
             surface=given("surface"),
             threshold=given("threshold"),
+            region=given("region"),
         output:
             mesh=temp(own("mesh")),
             figures=own("figures"),

@@ -17,11 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from addvc.analysis.struts import SPACING, Strut, nearest_line, resampled
+from addvc.analysis.struts import Strut
 from addvc.fem.mesh import TET_EDGES, Mesh
-from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
+from addvc.geometry.lines import nearest_line, resampled
+from addvc.geometry.skeleton import FREE_END, StrutGraph
+from addvc.geometry.stubs import dangling_stubs
 
 THIN = 1.0
 """Voxel^2: the section of a neck, at most."""
@@ -33,45 +34,6 @@ APART = 4.0
 def mesh_edges(mesh: Mesh) -> np.ndarray:
     """The distinct edges (e, 2) of a mesh of tetrahedra."""
     return np.unique(np.sort(mesh.cells[:, TET_EDGES].reshape(-1, 2), axis=1), axis=0)
-
-
-def dangling_stubs(graph: StrutGraph, mesh: Mesh, cut: np.ndarray) -> list[dict]:
-    """Branches that end in the bulk of the mesh, the longest first: position of the end, length beyond
-    the ball of its junction, distance to the nearest other one (None for a single one); voxels.
-
-    cut (n,) bool: nodes on platens, cuts and outer sides. An end counts when it is two strut diameters
-    away from those, a diameter beyond its junction, and within a radius of a node of the mesh."""
-    if not graph.branches:
-        return []
-    radius = float(np.median(graph.radii))
-    nodes = cKDTree(mesh.points)
-    border = cKDTree(mesh.points[cut]) if cut.any() else None
-    found = []
-    for branch in graph.branches:
-        if branch.ends.count(FREE_END) != 1:
-            continue
-        tip, length = free_end(branch, graph)
-        bulk = border is None or border.query(tip)[0] > 4 * radius
-        if bulk and length > 2 * radius and nodes.query(tip)[0] <= radius:
-            found.append({"position": tip.tolist(), "length": length})
-    ends = np.array([stub["position"] for stub in found]).reshape(-1, 3)
-    for stub, gap in zip(found, nearest_other(ends), strict=True):
-        stub["nearest"] = gap
-    return sorted(found, key=lambda stub: -stub["length"])
-
-
-def nearest_other(points: np.ndarray) -> list[float | None]:
-    """Distance of each point (n, 3) to the nearest other one, None where there is none."""
-    if len(points) < 2:
-        return [None] * len(points)
-    return cKDTree(points).query(points, k=2)[0][:, 1].tolist()
-
-
-def free_end(branch: Branch, graph: StrutGraph) -> tuple[np.ndarray, float]:
-    """Where a branch with one free end ends (3,), and its length beyond the ball of its junction."""
-    last = 0 if branch.ends[0] == FREE_END else -1
-    junction = branch.ends[0] if last else branch.ends[1]
-    return branch.points[last], branch.length - float(graph.radii[junction])
 
 
 def necks(struts: Sequence[Strut]) -> list[dict]:
@@ -95,7 +57,7 @@ def contacts(mesh: Mesh, edges: np.ndarray, graph: StrutGraph) -> list[np.ndarra
     nodes in common or with nodes that are neighbours."""
     if not graph.branches:
         return []
-    lines = [resampled(branch.points, SPACING) for branch in graph.branches]
+    lines = [resampled(branch.points) for branch in graph.branches]
     owner = np.empty(len(mesh.points), dtype=int)
     for number, nodes in enumerate(nearest_line(lines, mesh.points)):
         owner[nodes] = number
