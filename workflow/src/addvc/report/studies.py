@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
+from matplotlib.ticker import LogLocator
 
 from addvc.report import style
 
@@ -93,9 +94,12 @@ def ablation(found: Sequence[dict], labels: dict[int, str], outputs: Iterable[st
             _mark(ax, states.index(row["state"]) + 0.75 * place, row, name, methods)
         style.headline(ax, name, number)
         ax.set_xticks(range(len(states)), [labels[state] for state in states])
-        ax.set(xlabel="loading state", yscale="linear" if name.startswith("nodes") else "log")
+        ax.set_xlabel("loading state")
+        if not name.startswith("nodes"):
+            ax.set_yscale("log")
+            ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            ax.yaxis.set_minor_formatter("")
         ax.yaxis.set_major_formatter("{x:g}")
-        ax.yaxis.set_minor_formatter("")
         ax.grid(axis="y", lw=0.3, color="#dddddd")
     handles = [
         style.line(style.SERIES[n % 6], method.replace("_", " "), "", style.MARKERS[n % 6])
