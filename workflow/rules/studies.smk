@@ -265,6 +265,7 @@ if STATES:
         input:
             **({"error": given("error")} if HAS_TRUTH else {}),
             mesh=given("classes"),
+            figures=given("figures"),
             threshold=given("threshold"),
             cell_size=f"{R}/geometry/cell_size.json",
             solution=given("solution"),

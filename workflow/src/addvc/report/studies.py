@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from addvc.report import style
 
@@ -13,7 +13,7 @@ NAMES = {
     "l_k": ("$l_K$", "voxel"),
     "l_l": ("$l_L$", "voxel"),
     "l_e": ("$l_E$", "voxel"),
-    "nu": ("Poisson's ratio", "–"),
+    "nu": (r"$\nu$", "–"),
     "threshold": ("threshold", "grey level"),
     "size": ("mesh size", "voxel"),
 }
@@ -64,13 +64,15 @@ def ablation_rows(found: Sequence[dict], labels: dict[int, str]) -> list[list[st
 def sensitivity_rows(found: Sequence[dict]) -> list[list[str]]:
     """A row for each value of each parameter."""
     names, judged = header(found)
-    rows = [["Parameter", "Unit", "Value", "Times", "Method", "Nodes", *names, "Seminorm"]]
+    rows = [["Parameter", "Unit", "Value", "Times", "Method", "Nodes", "Solid kept (–)",
+             *names, "Seminorm"]]  # fmt: skip
     for r in found:
         name = r["parameter"]
         norm = r["seminorms"].get(name)
         rows.append([
             name, NAMES[name][1], f"{r['settings'][name]:.4g}", f"{r['factor']:g}", r["method"],
-            str(r["nodes"]), *figures(r, judged), "–" if norm is None else f"{norm:.4g}",
+            str(r["nodes"]), f"{r['kept']:.3f}", *figures(r, judged),
+            "–" if norm is None else f"{norm:.4g}",
         ])  # fmt: skip
     return rows
 
@@ -175,6 +177,12 @@ def _l_curve(ax: Axes, rows: list[dict], name: str, number: int) -> None:
         ax.annotate(f"{row['settings'][name]:.3g}", (a, b), (4, 4), textcoords="offset points",
                     fontsize=7)  # fmt: skip
     ax.margins(0.16)
+    low, high = ax.get_ylim()
+    least = 0.1 * abs(high)  # so that nothing does not look like something
+    if high - low < least:
+        ax.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+    ax.ticklabel_format(axis="y", useOffset=False)
+    ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.set(xlabel=SEMINORMS[name], ylabel="σ(r) (grey levels)")
     style.headline(ax, f"L-curve of {NAMES[name][0]} (voxels)", number)
 
