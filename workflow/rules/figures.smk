@@ -513,7 +513,7 @@ if STATES:
         input:
             expand(
                 f"{R}/dvc/{{name}}_state{{state}}.h5",
-                name=["start", "micro_start"],
+                name=["start", *MESO[1:], "micro_start"],
                 state=STATES,
             ),
         output:
