@@ -52,6 +52,33 @@ rule field:
         "../scripts/analysis/field.py"
 
 
+rule warp:
+    input:
+        mesh=f"{R}/geometry/micro.vtu",
+        region=f"{R}/geometry/region.json",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        fields=on_micro([FINEST, *MICRO]),
+    output:
+        f"{R}/analysis/warp_state{{state}}.json",
+    log:
+        f"{R}/logs/warp/state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/warp/state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1200, 15.0),
+        runtime=30,
+    params:
+        code=code("analysis/warp.py"),
+        names=[FINEST, *MICRO],
+    script:
+        "../scripts/analysis/warp.py"
+
+
 if HAS_TRUTH:
 
     rule truth_error:
@@ -269,6 +296,7 @@ rule summary:
         if HAS_TRUTH
         else [],
         expand(f"{R}/struts_state{{state}}.json", state=STATES),
+        expand(f"{R}/analysis/warp_state{{state}}.json", state=STATES),
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",

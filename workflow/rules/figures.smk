@@ -390,6 +390,7 @@ if STATES:
         input:
             CARRIED,
             smooth(0, *STATES),
+            expand(f"{R}/analysis/warp_state{{state}}.json", state=STATES),
         output:
             shown(
                 "fig16_warp.png",
@@ -533,6 +534,29 @@ if STATES:
             case=FIGURE_CASE,
         script:
             "../scripts/figures/more_starts.py"
+
+    rule more_warp:
+        input:
+            solutions(FINEST, *MICRO),
+            fields(*MICRO),
+            expand(f"{R}/analysis/warp_state{{state}}.json", state=STATES),
+        output:
+            shown("more_warp.csv", "more_warp", "Tables", "overlap with the image"),
+        log:
+            f"{R}/logs/figures/more_warp.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_warp.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=5,
+        params:
+            code=code("figures/more_warp.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_warp.py"
 
 
 if STATES and HAS_TRUTH:

@@ -101,6 +101,7 @@ def state_figures(
         "freeform": freeform_figures(folder, state, truth),
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
+        "warp": read_json(folder / f"analysis/warp_state{state}.json"),
     }
 
 
