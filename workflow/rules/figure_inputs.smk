@@ -50,6 +50,12 @@ def struts_truth(suffix):
     return expand(name, state=STATES) if HAS_TRUTH else []
 
 
+def uncertainty_truth():
+    """Errors against their uncertainty, where there is a truth."""
+    name = f"{R}/analysis/uncertainty_truth_state{{state}}.json"
+    return expand(name, state=STATES) if HAS_TRUTH else []
+
+
 def shown(name, number, category, shows):
     """A figure of the report and of the list of all figures, with its caption."""
     FIGURES.append(f"{R}/figures/{name}")

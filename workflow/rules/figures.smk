@@ -484,6 +484,36 @@ if STATES:
         script:
             "../scripts/figures/more_bending.py"
 
+    rule more_uncertainty:
+        input:
+            SPECIMEN,
+            smooth(0),
+            meshes("micro"),
+            solutions(MICRO[0]),
+            fields(MICRO[0]),
+            f"{R}/geometry/struts.h5",
+            f"{R}/analysis/uncertainty.h5",
+            f"{R}/analysis/uncertainty.json",
+            uncertainty_truth(),
+        output:
+            shown("more_uncertainty.png", "more_uncertainty", "Quality", "uncertainty"),
+        log:
+            f"{R}/logs/figures/more_uncertainty.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_uncertainty.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 6.0),
+            runtime=15,
+        params:
+            code=code("figures/more_uncertainty.py"),
+            case=FIGURE_CASE,
+            truth=HAS_TRUTH,
+        script:
+            "../scripts/figures/more_uncertainty.py"
+
     rule more_convergence:
         input:
             solutions(*MESO, *MICRO),

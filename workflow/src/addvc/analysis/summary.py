@@ -48,6 +48,7 @@ def summarise(
         "threshold": threshold["threshold"],
         "porosity": threshold["porosity"],
         "noise": threshold["noise"],
+        "uncertainty": read("analysis/uncertainty.json"),
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
         "states": [
