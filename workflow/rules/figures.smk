@@ -170,6 +170,36 @@ rule fig09:
         "../scripts/figures/fig09.py"
 
 
+rule fig14:
+    input:
+        SPECIMEN,
+        smooth(0),
+        f"{R}/geometry/cell_size.json",
+        f"{R}/geometry/micro.vtu",
+    output:
+        shown(
+            "fig14_local_region.png",
+            "fig14",
+            "Microscale DVC",
+            "slab of Fig. 15 to 17",
+        ),
+    log:
+        f"{R}/logs/figures/fig14.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig14.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 15.0),
+        runtime=15,
+    params:
+        code=code("figures/fig14.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig14.py"
+
+
 rule table1:
     input:
         SPECIMEN,
