@@ -30,8 +30,12 @@ def residuals(*names):
 
 
 def fields(*names):
-    """Fields with the validity of each node, in every state."""
-    return expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES)
+    """Fields with the validity of each node, in every state; of `micro` that of the struts too."""
+    struts = f"{R}/struts_state{{state}}.json" if MICRO[0] in names else []
+    return [
+        *expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES),
+        *expand(struts, state=STATES),
+    ]
 
 
 def struts():

@@ -233,6 +233,7 @@ rule table2:
         f"{R}/geometry/cell_size.json",
         meshes(*MESO, "micro"),
         solutions(*MESO, *MICRO),
+        fields(*MICRO),
         expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
     output:
         shown("table2_parameters.csv", "table2", "Tables", "parameters"),
@@ -547,6 +548,7 @@ if STATES:
     rule more_convergence:
         input:
             solutions(*MESO, *MICRO),
+            fields(*MICRO),
         output:
             shown("more_convergence.png", "more_convergence", "Quality", "convergence"),
             drawing("more_convergence"),
@@ -572,6 +574,8 @@ if STATES:
 
     rule more_starts:
         input:
+            solutions(MICRO[0]),
+            fields(MICRO[0]),
             expand(
                 f"{R}/dvc/{{name}}_state{{state}}.h5",
                 name=["start", "micro_start"],

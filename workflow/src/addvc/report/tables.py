@@ -142,13 +142,13 @@ def _ultimate(case: Case, name: str, key: str) -> str:
 
 
 def _outcome(case: Case, name: str) -> dict[str, str]:
-    """Iterations and sigma(r) on the mesh's own points, a row a state."""
+    """Iterations, verdict, and sigma(r) on the mesh's own points, a row a state each."""
     rows = {}
     for state in case.states:
         solution = case.solution(name, state)
-        mark = "" if solution.converged else " (not converged)"
         label = case.labels[state]
-        rows[f"Iterations, {label}"] = f"{solution.iterations}{mark}"
+        rows[f"Iterations, {label}"] = str(solution.iterations)
+        rows[f"Verdict, {label}"] = case.verdict(name, state)
         rows[f"σ(r), {label} (grey levels)"] = f"{solution.residual['std']:.3f}"
     return rows
 

@@ -20,7 +20,7 @@ def uncertainty(case: Case, outputs: Iterable[str], truth: bool) -> None:
     along it, against its radius, (c) with a truth, the errors of nodes against their uncertainty."""
     nodes, struts = load_uncertainty(case.path("analysis/uncertainty.h5"))
     found, unit = case.json("analysis/uncertainty.json"), style.voxels(case.voxel_um())
-    fig = style.figure(112 if truth else 96)
+    fig = style.figure(128 if truth else 96)
     left, right = fig.subfigures(1, 2, width_ratios=(1.15, 1))
     _map(left, case, nodes, unit)
     panels = right.subplots(2 if truth else 1, 1, squeeze=False)[:, 0]
@@ -29,6 +29,7 @@ def uncertainty(case: Case, outputs: Iterable[str], truth: bool) -> None:
     if truth:
         _calibration(panels[1], case)
         style.headline(panels[1], "errors of the nodes", 2)
+        right.legend(loc="outside lower center", handles=panels[1].get_legend_handles_labels()[0])
     spread = f"{found['draws']} draws: a node to {found['sampling_error']:.0%}"
     text = f"rms {found['rms']:.3f}, p95 {found['p95']:.3f} voxels; {spread}"
     left.supxlabel(text, fontsize=8)
@@ -74,4 +75,3 @@ def _calibration(ax: Axes, case: Case) -> None:
     ax.axline((0, 0), slope=1, color="#777777", lw=0.8, ls=":", label="noise alone")
     ax.set(xlabel="uncertainty (voxels)", ylabel="rms error (voxels)", xlim=(0, 1.1 * most))
     ax.set_ylim(bottom=0)
-    ax.legend()

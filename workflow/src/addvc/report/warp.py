@@ -26,7 +26,7 @@ def warped(case: Case, outputs: Iterable[str]) -> None:
     titles = "segmented $I_r$", f"segmented $I_d$, {case.labels[state]}"
     bodies = dict(zip(titles, surfaces, strict=True))
     for name in u:
-        title = f"$I_r$ carried by {name}{_failure(case, name, state)}"
+        title = f"$I_r$ carried by {name}: {case.verdict(name, state)}"
         bodies[title] = _cut(mesh, u[name], *after)
     found = case.json(f"analysis/warp_state{state}.json")
     words = [_words(found[name]) for name in u]
@@ -52,11 +52,6 @@ def _words(found: dict) -> str:
     figures = (found["dice"], found["distance_median"], found["distance_p95"])
     overlap, middle, far = ("–" if x is None else f"{x:.2f}" for x in figures)
     return f"whole mesh: overlap {overlap}\ndistance {middle}, p95 {far} voxels"
-
-
-def _failure(case: Case, name: str, state: int) -> str:
-    status = case.status(name, state)
-    return f" ({status})" if status else ""
 
 
 def _carried_box(mesh: Mesh, u: np.ndarray, box: tuple, axis: int) -> tuple[np.ndarray, np.ndarray]:
@@ -106,7 +101,7 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
 
 
 def _zoom_title(case: Case, name: str, state: int) -> str:
-    return rf"$\Omega_d$ and $\Omega_r + u$, {name}{_failure(case, name, state)}"
+    return rf"$\Omega_d$ and $\Omega_r + u$, {name}: {case.verdict(name, state)}"
 
 
 def _places(case: Case, mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:
