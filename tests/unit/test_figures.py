@@ -90,7 +90,8 @@ def test_a_result_without_flags_is_converged_and_failures_are_red(case, folder):
     style.headline(bad, "a very long name, " + case.title(2, "meso9"), 1)
     assert good._left_title.get_text() == "(a) 3.4 %: converged"
     assert bad._left_title.get_text().endswith("5.2 %:\nnot converged")
-    assert style.narrow(case.title(2, "meso9")) == "5.2 %\nnot converged"
+    words = "5.2 %: not converged, 35 struts flagged"
+    assert style.narrow(words) == "5.2 %\nnot converged,\n35 struts\nflagged"
     assert "\n" not in style.two_lines("a long title of a panel: of something else")
     assert bad._left_title.get_color() == style.RED != good._left_title.get_color()
     plt.close(fig)

@@ -27,7 +27,7 @@ SOLID, BLUE, RED, ORANGE, DARK = "#c6ccd3", "#3d86cf", "#c8341f", "#e08214", "#3
 SERIES = ("#440154", "#31688e", "#35b779", "#e6a000", "#c51b7d", "#7f7f7f")
 MARKERS = "osD^vP"
 AXES = "xyz"
-LONG, NARROW = 28, 13  # characters: of a title that takes two lines, of a line below a tick
+LONG, NARROW = 28, 14  # characters: of a title that takes two lines, of a line below a tick
 
 plt.rcParams.update(
     {
@@ -99,7 +99,8 @@ def two_lines(text: str) -> str:
 def narrow(text: str) -> str:
     """The title of a state as lines of a word or two, for a tick."""
     label, _, words = text.partition(": ")
-    return "\n".join([label, *textwrap.wrap(words, NARROW)])
+    parts = words.replace(", ", ",\n").splitlines()
+    return "\n".join([label, *(line for part in parts for line in textwrap.wrap(part, NARROW))])
 
 
 def robust_range(
