@@ -24,7 +24,7 @@ def starts(case: Case, outputs: Iterable[str]) -> None:
         for result, file in (files | {"micro": "micro_start"}).items():
             notes = load_notes(case.path(f"dvc/{file}_state{state}.h5"))
             rows += [
-                [case.labels[state], result, *_row(one, notes["best"])]
+                [case.title(state, case.micro[0]), result, *_row(one, notes["best"])]
                 for one in notes["candidates"]
             ]
     for path in outputs:
