@@ -154,6 +154,13 @@ def test_the_front_page_answers_first():
     assert "State 4 (4.4 %; 4.4% measured): **FAILED: not to be used**, 20.0% of" in head
 
 
+def test_the_front_page_leads_to_the_scene_and_to_paraview():
+    head = front_page(summary(GOOD), CONFIG, SCANS).split("Warnings and failures")[0]
+    links = docutils.core.publish_doctree(head).findall(docutils.nodes.reference)
+    assert [link["refuri"] for link in links] == ["scene.html", "fields/micro.pvd"]
+    assert "scene.html" not in front_page(summary(), CONFIG, SCANS)
+
+
 def test_the_tables_of_the_front_page_hold_the_numbers():
     parts = sections(front_page(summary(*ALL), CONFIG, SCANS))
     assert "0.033" in parts["Residual and error of each mesh"]

@@ -113,6 +113,12 @@ def test_the_report_holds_everything_and_fetches_nothing(results):
         assert name in text
 
 
+def test_there_is_a_scene_and_a_series_of_each_mesh(results):
+    assert 4e6 < (results / "scene.html").stat().st_size < 25e6
+    states = {path.name.partition("_state")[0] for path in results.glob("fields/*.vtu")}
+    assert {path.stem for path in results.glob("fields/*.pvd")} == states
+
+
 def figures():
     """Names of all figures and tables in the rules."""
     rules = (ROOT / "workflow/rules/figures.smk").read_text()

@@ -74,7 +74,7 @@ def heading(text: str, line: str = "-") -> list[str]:
 def front_page(summary: dict, config: dict, scans: dict) -> str:
     """First page of the report (reStructuredText): the answer, what to distrust, the provenance."""
     lines = heading(f"addvc: case {summary['case']}", "=")
-    lines += answer(summary)
+    lines += answer(summary) + look_around(summary)
     lines += heading("Warnings and failures") + warnings(summary)
     lines += heading("Residual and error of each mesh") + results_table(summary)
     lines += heading("Convergence") + convergence_table(summary)
@@ -106,6 +106,19 @@ def answer(summary: dict) -> list[str]:
             f"valid{error_words(found['error'])}.{strut_words(state.get('struts'))}"
         )
     return lines
+
+
+def look_around(summary: dict) -> list[str]:
+    """Where the result can be seen in 3D: links that hold beside the report, with the folder."""
+    if not summary["states"]:
+        return []
+    name = micro_name(summary)
+    return [
+        "",
+        "Look around in 3D, in this browser and without a network: `scene.html <scene.html>`__ (beside "
+        f"this file). ParaView opens all states at once: `fields/{name}.pvd <fields/{name}.pvd>`__, "
+        "then Filters, Warp By Vector with `displacement`; each other mesh has a file like it.",
+    ]
 
 
 def strut_words(struts: dict | None) -> str:
