@@ -109,6 +109,7 @@ def test_the_report_holds_everything_and_fetches_nothing(results):
     assert re.findall(rf"{tags}[^>]*?\b(?:src|href|data)\s*=\s*{away}[^>]*>", text) == []
     assert re.findall(rf"url\(\s*{away}|@import\s+{away}", text) == []
     assert "Warnings and failures" in text
+    assert "align-items: flex-start" in text, "its first page can be reached in a browser"
     for name in figures():
         assert name in text
 

@@ -2,6 +2,16 @@
 
 FIGURE_CASE = {"root": R, "labels": LABELS, "meso": MESO, "micro": MICRO}
 FIGURES = []
+CHAPTERS = {  # the order of the paper, then what is beyond it; snakemake sorts them
+    "Specimen": "1 Specimen",
+    "Meshes": "2 Meshes",
+    "Mesoscale DVC": "3 Mesoscale DVC",
+    "Microscale DVC": "4 Microscale DVC",
+    "Tables": "5 Tables",
+    "Struts": "6 Beyond the paper: struts",
+    "Quality": "7 Beyond the paper: quality",
+    "Synthetic test": "8 Beyond the paper: the synthetic test",
+}
 SPECIMEN = [f"{R}/geometry/specimen.json", f"{R}/geometry/threshold.json"]
 
 
@@ -58,7 +68,7 @@ def shown(name, number, category, shows):
     words = words.replace("table", "Table ").replace("more_", "")
     return report(
         FIGURES[-1],
-        category=category,
+        category=CHAPTERS[category],
         caption=caption,
         labels={"figure": words, "shows": shows},
     )

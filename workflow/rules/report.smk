@@ -92,6 +92,7 @@ rule report:
         FIGURES,
         page=f"{R}/report/front.rst",
         config=f"{R}/report/config.json",
+        stylesheet=str(WORKFLOW / "report/report.css"),
         captions=sorted(map(str, (WORKFLOW / "report").glob("*.rst"))),
     output:
         f"{R}/report.html",
