@@ -29,6 +29,7 @@ JUDGES = {
 JUDGING = {
     "truth_error",
     "struts_truth",
+    "cells_truth",
     "difficulty",
     "twin_check",
 }  # rules and scripts that may read its truth

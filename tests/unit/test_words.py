@@ -154,6 +154,17 @@ def test_the_front_page_answers_first():
     assert "State 4 (4.4 %; 4.4% measured): **FAILED: not to be used**, 20.0% of" in head
 
 
+def test_the_front_page_tells_of_a_band():
+    band = {"normal": [0, 1, 0], "thickness": 24.6, "angle": 23.9, "flatness": 0.4,
+            "band_strain_share": 0.225, "band_volume_share": 0.131}  # fmt: skip
+    told = front_page(summary(GOOD | {"cells": band}), CONFIG, SCANS)
+    assert "22% of the compression is in a band with 13% of the volume, 25 voxels thick" in told
+    assert "24 degrees" in told
+    lump = front_page(summary(GOOD | {"cells": band | {"flatness": 0.9}}), CONFIG, SCANS)
+    assert "a lump" in lump and "24 degrees" not in lump
+    assert "band" not in front_page(summary(GOOD | {"cells": dict.fromkeys(band)}), CONFIG, SCANS)
+
+
 def test_the_front_page_leads_to_the_scene_and_to_paraview():
     head = front_page(summary(GOOD), CONFIG, SCANS).split("Warnings and failures")[0]
     links = docutils.core.publish_doctree(head).findall(docutils.nodes.reference)

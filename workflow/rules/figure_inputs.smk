@@ -60,6 +60,17 @@ def struts_truth(suffix):
     return expand(name, state=STATES) if HAS_TRUTH else []
 
 
+def cells():
+    """Strain of cells, and its bands, in every state; the truth of both, where there is one."""
+    names = ["cells", *(["analysis/cells_truth"] if HAS_TRUTH else [])]
+    return expand(
+        f"{R}/{{name}}_state{{state}}.{{suffix}}",
+        name=names,
+        state=STATES,
+        suffix=["csv", "json"],
+    )
+
+
 def shown(name, number, category, shows):
     """A figure of the report and of the list of all figures, with its caption."""
     FIGURES.append(f"{R}/figures/{name}")

@@ -101,6 +101,7 @@ def state_figures(
         "freeform": freeform_figures(folder, state, truth),
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
+        "cells": read_json(folder / f"cells_state{state}.json")["localisation"],
     }
 
 

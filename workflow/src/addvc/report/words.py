@@ -104,6 +104,7 @@ def answer(summary: dict) -> list[str]:
             f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
             f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
             f"valid{error_words(found['error'])}.{strut_words(state.get('struts'))}"
+            + band_words(state.get("cells"))
         )
     return lines
 
@@ -131,6 +132,22 @@ def strut_words(struts: dict | None) -> str:
     verdict = "Bending" if struts["bending_share"] > 0.5 else "Not bending"
     share = f"{struts['bending_share']:.0%} of the energy of {count} is in bending"
     return f" {verdict}-dominated: {share}."
+
+
+def band_words(cells: dict | None) -> str:
+    """Where the strain of cells gathers, if it does."""
+    if not cells or cells["normal"] is None:
+        return ""
+    shape = (
+        f"{cells['thickness']:.0f} voxels thick, its normal {cells['angle']:.0f} degrees from the "
+        "loading axis"
+        if cells["flatness"] < 0.7
+        else "a lump rather than a plate"
+    )
+    return (
+        f" {cells['band_strain_share']:.0%} of the compression is in a band with "
+        f"{cells['band_volume_share']:.0%} of the volume, {shape}."
+    )
 
 
 def warnings(summary: dict) -> list[str]:
