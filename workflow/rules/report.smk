@@ -10,6 +10,7 @@ rule front_page:
     input:
         summary=f"{R}/summary.json",
         scans=f"{R}/input.json",
+        hashes=f"{R}/input_hashes.json",
     output:
         page=f"{R}/report/front.rst",
         config=f"{R}/report/config.json",
