@@ -48,9 +48,11 @@ def test_the_numbers_are_those_of_the_summary():
     for words in ("commit ab12", "(3, of 120 x 140 x 120 voxels of 6.67 micrometres, binned by 3",
                   "is 28.8 voxels", "239573 tetrahedra", "12.3 and 12.3 voxels", "4.7e-04 voxel",
                   "2.00 to 3.00 grey levels", "75 to 80 %", "0.076 to 0.113 voxel",
-                  "as it did in every state"):  # fmt: skip
+                  "as that of corotational did in every state"):  # fmt: skip
         assert words in text
-    assert "which it did not at 2 %" in told(config(), state(1), state(2, converged=False))
+    assert "which that of corotational did not at 2 %" in told(
+        config(), state(1), state(2, converged=False)
+    )
     assert "truth" not in told(config())
 
 
@@ -62,8 +64,9 @@ def test_each_method_is_told_with_what_it_uses():
     )
     paper = told(config(methods=["eq10"]))
     assert "Geman-McClure" not in paper and "turns" not in paper and "(eq10)" in paper
-    plain = told(config(methods=["corotational"], robust="none", rotated=False, shell=0))
-    for word in ("Geman-McClure", "turns", "void within", "equilibrium gap"):
+    assert "carried by their neighbours" in both and "neighbours" not in paper
+    plain = told(config(methods=["corotational"], robust="none", rotated=False, shell=0, mending=0))
+    for word in ("neighbours", "Geman-McClure", "turns", "void within", "equilibrium gap"):
         assert word not in plain
     assert "Labelle" not in told(config() | {"mesh": {"backend": "pytetwild"}})
 

@@ -11,8 +11,12 @@ from snakemake.utils import validate
 from addvc.errors import AddvcError
 from addvc.report.words import check_verdicts, closing_lines, front_page, micro_name, warnings
 
-CONFIG = {"case": "foam-2_b", "porosity": 0.96, "micro": {"methods": ["eq10"]},
-          "scans": {"reference": "scans/*.tif", "states": ["2/_a_/|x|"], "voxel_size_um": 6.67}}  # fmt: skip
+CONFIG = {
+    "case": "foam-2_b",
+    "porosity": 0.96,
+    "scans": {"reference": "scans/*.tif", "states": ["2/_a_/|x|"], "voxel_size_um": 6.67},
+    "micro": {"methods": ["eq10"]},
+}
 validate(CONFIG, str(Path(__file__).parents[2] / "workflow/schemas/config.schema.yaml"))
 SCANS = {
     "scans": [

@@ -128,13 +128,19 @@ def micro(summary: dict, config: dict) -> str:
     section = config["micro"]
     options = micro_options(section, summary["cell_size"], loading_axis(config))
     along = style.AXES[loading_axis(config)]
-    wave = f"their weight set on a shear wave of period {options.period:g} voxels along {along}"
+    wave = f"in weights set on a shear wave of period {options.period:g} voxels along {along}"
     for name, method in micro_names(config).items():
         lead = " The displacement of its nodes minimises" if name == "micro" else " For comparison:"
         text += f"{lead} {functional(method, section, options)}, {wave} ({method})."
+    first = section["methods"][0]
+    if section["mending"] and first != "eq10":
+        text += (
+            " Struts whose residual stayed too large were carried by their neighbours and registered "
+            f"again, at most {section['mending']} times."
+        )
     return text + (
         f" A loop ended when the rms of an increment fell below {section['tolerance']:g} voxel, "
-        f"{endings(summary)}."
+        f"{endings(summary, first)}."
     )
 
 
@@ -157,10 +163,12 @@ def functional(method: str, section: dict, options) -> str:
     )
 
 
-def endings(summary: dict) -> str:
+def endings(summary: dict, method: str) -> str:
     """In which states the loop of the default method ended."""
     lost = [state["label"] for state in summary["states"] if not state["micro"]["converged"]]
-    return f"which it did not at {listing(lost)}" if lost else "as it did in every state"
+    if lost:
+        return f"which that of {method} did not at {listing(lost)}"
+    return f"as that of {method} did in every state"
 
 
 def quality(summary: dict) -> str:
