@@ -110,6 +110,8 @@ def test_the_report_holds_everything_and_fetches_nothing(results):
     assert re.findall(rf"url\(\s*{away}|@import\s+{away}", text) == []
     assert "Warnings and failures" in text
     assert "align-items: flex-start" in text, "its first page can be reached in a browser"
+    labels = [json.loads(found) for found in re.findall(r'"labels": (\{.*?\})', text)]
+    assert len(labels) > 15 and all(len(one) == 1 for one in labels), "two may become a switch"
     for name in figures():
         assert name in text
 

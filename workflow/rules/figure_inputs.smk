@@ -72,16 +72,20 @@ def cells():
 
 
 def shown(name, number, category, shows):
-    """A figure of the report and of the list of all figures, with its caption."""
+    """A figure of the report and of the list of all figures, with its caption.
+
+    One label only: of a chapter with two figures snakemake's report would make a switch of the second
+    label, and fail on it."""
     FIGURES.append(f"{R}/figures/{name}")
     caption = f"../report/{number}.rst"
     words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
-    words = words.replace("table", "Table ").replace("more_", "")
+    words = words.replace("table", "Table ") + ": "
+    name = shows if number.startswith("more") else words + shows
     return report(
         FIGURES[-1],
         category=CHAPTERS[category],
         caption=caption,
-        labels={"figure": words, "shows": shows},
+        labels={"figure": name},
     )
 
 
