@@ -156,6 +156,32 @@ if HAS_TRUTH:
         script:
             "../scripts/analysis/struts_truth.py"
 
+    rule cells_truth:
+        input:
+            mesh=f"{R}/geometry/micro.vtu",
+            cell_size=f"{R}/geometry/cell_size.json",
+            table=f"{R}/cells_state{{state}}.csv",
+            notes=f"{R}/cells_state{{state}}.json",
+            truth=TRUTH,
+        output:
+            table=f"{R}/analysis/cells_truth_state{{state}}.csv",
+            figures=f"{R}/analysis/cells_truth_state{{state}}.json",
+        log:
+            f"{R}/logs/cells_truth/state{{state}}.log",
+        benchmark:
+            f"{R}/benchmarks/cells_truth/state{{state}}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1000, 10.0),
+            runtime=60,
+        params:
+            code=code("analysis/cells_truth.py"),
+            axis=AXIS,
+        script:
+            "../scripts/analysis/cells_truth.py"
+
     rule difficulty:
         input:
             mesh=f"{R}/geometry/micro.vtu",
@@ -314,6 +340,31 @@ rule struts:
         "../scripts/analysis/struts.py"
 
 
+rule cells:
+    input:
+        mesh=f"{R}/geometry/micro.vtu",
+        cell_size=f"{R}/geometry/cell_size.json",
+        field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
+    output:
+        table=f"{R}/cells_state{{state}}.csv",
+        notes=f"{R}/cells_state{{state}}.json",
+    log:
+        f"{R}/logs/cells/state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/cells/state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1000, 10.0),
+        runtime=60,
+    params:
+        code=code("analysis/cells.py"),
+        axis=AXIS,
+    script:
+        "../scripts/analysis/cells.py"
+
+
 rule summary:
     input:
         f"{R}/input.json",
@@ -346,8 +397,11 @@ rule summary:
         )
         if HAS_TRUTH
         else [],
-        expand(f"{R}/struts_state{{state}}.json", state=STATES),
-        expand(f"{R}/analysis/warp_state{{state}}.json", state=STATES),
+        expand(
+            f"{R}/{{name}}_state{{state}}.json",
+            name=["struts", "cells", "analysis/warp"],
+            state=STATES,
+        ),
         f"{R}/analysis/uncertainty.json",
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:

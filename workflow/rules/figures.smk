@@ -545,6 +545,38 @@ if STATES:
         script:
             "../scripts/figures/more_uncertainty.py"
 
+    rule more_localisation:
+        input:
+            SPECIMEN,
+            smooth(0),
+            solutions(FINEST, MICRO[0]),
+            fields(MICRO[0]),
+            cells(),
+        output:
+            shown(
+                "more_localisation.png",
+                "more_localisation",
+                "Struts",
+                "strain of cells and its bands",
+            ),
+            drawing("more_localisation"),
+        log:
+            f"{R}/logs/figures/more_localisation.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_localisation.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 2.0),
+            runtime=10,
+        params:
+            code=code("figures/more_localisation.py"),
+            case=FIGURE_CASE,
+            truth=HAS_TRUTH,
+        script:
+            "../scripts/figures/more_localisation.py"
+
     rule more_convergence:
         input:
             solutions(*MESO, *MICRO),

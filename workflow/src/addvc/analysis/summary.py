@@ -103,6 +103,7 @@ def state_figures(
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
         "warp": read_json(folder / f"analysis/warp_state{state}.json"),
+        "cells": read_json(folder / f"cells_state{state}.json")["localisation"],
     }
 
 
