@@ -261,6 +261,33 @@ rule strut_partition:
         "../scripts/analysis/strut_partition.py"
 
 
+rule topology:
+    input:
+        solid=f"{R}/geometry/solid.h5",
+        threshold=f"{R}/geometry/threshold.json",
+        mesh=f"{R}/geometry/micro.vtu",
+        struts=f"{R}/geometry/struts.h5",
+        starts=expand(f"{R}/dvc/micro_start_state{{state}}.h5", state=STATES),
+        solutions=expand(f"{R}/dvc/{MICRO[0]}_state{{state}}.h5", state=STATES),
+    output:
+        f"{R}/geometry/topology.json",
+    log:
+        f"{R}/logs/topology/all.log",
+    benchmark:
+        f"{R}/benchmarks/topology/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 15.0),
+        runtime=60,
+    params:
+        code=code("analysis/topology.py"),
+        states=STATES,
+    script:
+        "../scripts/analysis/topology.py"
+
+
 rule noise_draws:
     input:
         mesh=f"{R}/geometry/micro.vtu",
@@ -371,6 +398,7 @@ rule summary:
         f"{R}/geometry/cell_size.json",
         f"{R}/geometry/threshold.json",
         expand(f"{R}/geometry/{{mesh}}.json", mesh=[*MESO, "micro"]),
+        f"{R}/geometry/topology.json",
         expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
         expand(
             f"{R}/dvc/{{name}}_state{{state}}.h5",

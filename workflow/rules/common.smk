@@ -9,6 +9,7 @@ WORKFLOW = Path(str(workflow.current_basedir)).parent
 sys.path.insert(0, str(WORKFLOW / "src"))
 
 from addvc import config as settings
+from addvc import studies
 from addvc.errors import ConfigError
 from addvc.provenance import code_hash
 

@@ -200,6 +200,36 @@ rule fig14:
         "../scripts/figures/fig14.py"
 
 
+rule more_topology:
+    input:
+        SPECIMEN,
+        smooth(0),
+        meshes("micro"),
+        f"{R}/geometry/topology.json",
+    output:
+        table=shown(
+            "more_topology.csv", "more_topology", "Tables", "stubs, necks and welds"
+        ),
+        picture=shown(
+            "more_topology.png", "more_topology", "Meshes", "stubs, necks and welds"
+        ),
+    log:
+        f"{R}/logs/figures/more_topology.log",
+    benchmark:
+        f"{R}/benchmarks/figures/more_topology.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 15.0),
+        runtime=10,
+    params:
+        code=code("figures/more_topology.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/more_topology.py"
+
+
 rule table1:
     input:
         SPECIMEN,

@@ -51,6 +51,7 @@ def summarise(
         "uncertainty": read("analysis/uncertainty.json"),
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
+        "topology": read("geometry/topology.json")["counts"],
         "states": [
             state_figures(folder, state, label, meshes, finest, axis, truth)
             for state, label in states.items()
