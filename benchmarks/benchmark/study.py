@@ -1,0 +1,87 @@
+"""What a run of the workflow measured on one case, and at what cost: beside it goes the peer."""
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from addvc import config as settings
+from addvc.analysis.truth import Judge, load_truth
+from addvc.errors import AddvcError
+from addvc.fem.io import read_vtu
+from addvc.images.files import read_json
+
+RESULTS = {"meso12": "meso 12", "freeform": "free-form", "micro-eq10": "micro, Eq. 10",
+           "micro": "micro, corotational"}  # fmt: skip
+"""What is compared of a case of the workflow, with its name in tables."""
+
+MESO = [
+    *("smooth/state{s}", "start/zero_state{s}", "start/platens_state{s}", "freeform/state{s}"),
+    *("freeform_on/meso33_state{s}", "rescale/zero_state{s}", "rescale/platens_state{s}"),
+    *("rescale/freeform_state{s}", "best_start/state{s}", "meso_dvc/meso33_state{s}"),
+    *("meso_dvc/meso23_state{s}", "meso_dvc/meso12_state{s}"),
+]
+MICRO = [*MESO, "freeform_on/micro_state{s}", "transfer/state{s}", "micro_start/state{s}"]
+JOBS = {
+    "meso12": MESO,
+    "freeform": ["smooth/state{s}", "freeform/state{s}"],
+    "micro": [*MICRO, "micro_dvc/micro_state{s}"],
+    "micro-eq10": [*MICRO, "micro_dvc/micro-eq10_state{s}"],
+}
+"""Jobs that lead to the displacement of one state, all candidate starts among them. Meshes and
+factors, made once a reference, are apart: `ONCE`."""
+
+ONCE = ("cell_size", "threshold", "surface", "micro_mesh", "solid", "penalised_nodes", "shell",
+        "factor", "meso_mesh", "platen_grid", "specimen")  # fmt: skip
+
+
+def cpu_seconds(path: Path) -> float:
+    """CPU time of one job, from the benchmark file that snakemake wrote."""
+    with path.open() as file:
+        text = next(csv.DictReader(file, delimiter="\t"))["cpu_time"]
+    try:
+        return float(text)
+    except ValueError:  # "NA": too short to be sampled
+        return 0.0
+
+
+def cost(folder: Path, result: str, state: int) -> float:
+    """CPU seconds of all jobs that lead to a result in one state."""
+    return sum(
+        cpu_seconds(folder / f"benchmarks/{job.format(s=state)}.tsv") for job in JOBS[result]
+    )
+
+
+def cost_once(folder: Path) -> float:
+    """CPU seconds of meshes and factors, which all states share."""
+    return sum(
+        cpu_seconds(path) for rule in ONCE for path in folder.glob(f"benchmarks/{rule}/*.tsv")
+    )
+
+
+def truth_of(folder: Path) -> Judge:
+    """The truth of a case of the workflow, whose options lie in its folder."""
+    config = read_json(folder / "report/config.json")
+    if settings.case_kind(config) == "twin":
+        return load_truth(Path(settings.twin_folder(settings.twin_parts(config)[0]), "motion.h5"))
+    if "truth" not in config:
+        raise AddvcError(f"{folder} has neither `twin` nor `truth`: nothing can be compared there")
+    return load_truth(config["truth"])
+
+
+def bulk_nodes(mesh: Path) -> np.ndarray:
+    """(n, 3) the nodes of the micro mesh at which errors are measured: those not penalised."""
+    points, _, classes, _ = read_vtu(mesh)
+    return points[classes["penalised"] == 0]
+
+
+def rows_of_study(folder: Path, states: Iterable[int]) -> list[dict]:
+    """One row for each state and result of the workflow: errors and CPU seconds."""
+    return [
+        {"state": state, "tool": label, "settings": ""}
+        | read_json(folder / f"analysis/error_{name}_state{state}.json")
+        | {"cpu_s": cost(folder, name, state)}
+        for state in states
+        for name, label in RESULTS.items()
+    ]
