@@ -1,102 +1,114 @@
-# The default twin: the workflow's results beside B-spline registration by elastix.
+# Each case: the workflow's results beside B-spline registration by elastix.
 
-SEEDS = {int(seed): study for seed, study in config["seeds"].items()}
-TWIN_STATES = [1, 2, 3, 4]
-PEER_TABLES = expand(f"{R}/peers_{{seed}}.csv", seed=SEEDS)
+CASES = config["cases"]
+CASE_TABLES = [f"{R}/{case['table']}.csv" for case in CASES.values()]
 COLUMNS = [
-    "state",
-    "tool",
-    "rms",
-    "rms_normal",
-    "median",
-    "p95",
-    "within_1_voxel",
-    "cpu_ratio",
-    "settings",
+    *("state", "tool", "rms", "rms_normal", "median", "p95", "within_1_voxel"),
+    *("cpu_ratio", "settings"),
 ]
-RUNS = [
-    {"state": state, "tool": f"elastix {spacing}", "settings": name}
-    for state in TWIN_STATES
-    for spacing in config["peers"]["spacings"]
-    for name in config["peers"]["settings"]
-]
+PREFIX = {case["table"]: name for name, case in CASES.items()}
 
 
 wildcard_constraints:
-    seed=r"\d+",
+    case="|".join(CASES),
+    table="|".join(PREFIX),
+    state=r"\d+",
     spacing=r"\d+",
-    settings="|".join(config["peers"]["settings"]),
+    l_e=r"\d+",
+    settings="|".join(config["elastix"]["settings"]),
 
 
-def study(wildcards):
-    """The folder of the case of a seed."""
-    return f"results/{SEEDS[int(wildcards.seed)]['case']}"
+def runs_of(table):
+    """Runs of elastix for a table: state, spacing, settings."""
+    return [
+        {"state": state, "tool": f"elastix {spacing}", "settings": name}
+        for state in CASES[PREFIX[table]]["states"]
+        for spacing in config["elastix"]["spacings"]
+        for name in config["elastix"]["settings"]
+    ]
+
+
+def found_by_runs(wildcards):
+    """The files of `runs_of`, in its order."""
+    return [
+        f"{R}/elastix/{PREFIX[wildcards.table]}_state{run['state']}"
+        f"_{run['tool'].split()[1]}_{run['settings']}.json"
+        for run in runs_of(wildcards.table)
+    ]
+
+
+def varied(wildcards):
+    """Runs of micro DVC with other cut-offs: of the pairs."""
+    case = PREFIX[wildcards.table]
+    lengths = config["l_e"] if case in config["pairs"] else []
+    return [f"{R}/l_e/{case}_{length}.json" for length in lengths]
 
 
 rule study:
     input:
-        lambda wildcards: SEEDS[int(wildcards.seed)]["configfile"],
+        config=lambda wildcards: CASES[wildcards.case]["configfile"],
+        made=lambda wildcards: [
+            f"{R}/made/{wildcards.case}/{name}"
+            for name in CASES[wildcards.case].get("made", [])
+        ],
     output:
-        f"{R}/study_{{seed}}.json",
+        f"{R}/study_{{case}}.json",
     log:
-        f"{R}/logs/study/{{seed}}.log",
+        f"{R}/logs/study/{{case}}.log",
     benchmark:
-        f"{R}/benchmarks/study/{{seed}}.tsv"
+        f"{R}/benchmarks/study/{{case}}.tsv"
     threads: workflow.cores
     resources:
         mem_mb=4000,
         runtime=120,
-    params:
-        case=study,
     shell:
-        "snakemake --configfile {input} --cores {threads} --nolock {params.case}/summary.json"
-        " {params.case}/report/config.json >{log} 2>&1 && cp {params.case}/summary.json {output}"
+        "snakemake --configfile {input.config} --cores {threads} --nolock --rerun-incomplete"
+        " results/{wildcards.case}/summary.json results/{wildcards.case}/report/config.json"
+        " >{log} 2>&1 && cp results/{wildcards.case}/summary.json {output}"
 
 
 rule elastix:
     input:
-        f"{R}/study_{{seed}}.json",
+        f"{R}/study_{{case}}.json",
     output:
-        f"{R}/elastix/{{seed}}_state{{state}}_{{spacing}}_{{settings}}.json",
+        f"{R}/elastix/{{case}}_state{{state}}_{{spacing}}_{{settings}}.json",
     log:
-        f"{R}/logs/elastix/{{seed}}_state{{state}}_{{spacing}}_{{settings}}.log",
+        f"{R}/logs/elastix/{{case}}_state{{state}}_{{spacing}}_{{settings}}.log",
     benchmark:
-        f"{R}/benchmarks/elastix/{{seed}}_state{{state}}_{{spacing}}_{{settings}}.tsv"
+        f"{R}/benchmarks/elastix/{{case}}_state{{state}}_{{spacing}}_{{settings}}.tsv"
     threads: workflow.cores
     resources:
         mem_mb=2000,
         runtime=30,
     params:
         code=code("elastix.py"),
-        folder=study,
-        settings=lambda wildcards: config["peers"]["settings"][wildcards.settings],
+        folder="results/{case}",
+        settings=lambda wildcards: config["elastix"]["settings"][wildcards.settings],
     script:
         "scripts/elastix.py"
 
 
-rule peers:
+rule compare:
     input:
-        study=f"{R}/study_{{seed}}.json",
-        peers=[
-            f"{R}/elastix/{{seed}}_state{run['state']}_{run['tool'].split()[1]}_{run['settings']}.json"
-            for run in RUNS
-        ],
+        peers=found_by_runs,
+        varied=varied,
+        study=lambda wildcards: f"{R}/study_{PREFIX[wildcards.table]}.json",
     output:
-        table=f"{R}/peers_{{seed}}.csv",
-        all=f"{R}/peers_{{seed}}_settings.csv",
+        table=f"{R}/{{table}}.csv",
+        all=f"{R}/{{table}}_settings.csv",
     log:
-        f"{R}/logs/peers/{{seed}}.log",
+        f"{R}/logs/compare/{{table}}.log",
     benchmark:
-        f"{R}/benchmarks/peers/{{seed}}.tsv"
+        f"{R}/benchmarks/compare/{{table}}.tsv"
     threads: 1
     resources:
         mem_mb=600,
         runtime=10,
     params:
-        code=code("peers.py"),
-        folder=study,
-        states=TWIN_STATES,
-        runs=RUNS,
+        code=code("compare.py"),
+        folder=lambda wildcards: f"results/{PREFIX[wildcards.table]}",
+        states=lambda wildcards: CASES[PREFIX[wildcards.table]]["states"],
+        runs=lambda wildcards: runs_of(wildcards.table),
         columns=COLUMNS,
     script:
-        "scripts/peers.py"
+        "scripts/compare.py"

@@ -1,6 +1,7 @@
 """What a run of the workflow measured on one case, and at what cost: beside it goes the peer."""
 
 import csv
+import time
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -8,9 +9,14 @@ import numpy as np
 
 from addvc import config as settings
 from addvc.analysis.truth import Judge, load_truth
+from addvc.correlation.corotational import Problem, corotational
+from addvc.correlation.micro import elastic, mending, micro_options, micro_reference, stages
+from addvc.correlation.store import load_field, load_order
 from addvc.errors import AddvcError
-from addvc.fem.io import read_vtu
+from addvc.fem.io import read_mesh, read_vtu
+from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
+from addvc.images.scans_store import load_volume
 
 RESULTS = {"meso12": "meso 12", "freeform": "free-form", "micro-eq10": "micro, Eq. 10",
            "micro": "micro, corotational"}  # fmt: skip
@@ -70,10 +76,31 @@ def truth_of(folder: Path) -> Judge:
     return load_truth(config["truth"])
 
 
-def bulk_nodes(mesh: Path) -> np.ndarray:
-    """(n, 3) the nodes of the micro mesh at which errors are measured: those not penalised."""
-    points, _, classes, _ = read_vtu(mesh)
-    return points[classes["penalised"] == 0]
+def bulk_nodes(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) of the micro mesh and where errors are measured (n,) bool: not penalised."""
+    points, _, classes, _ = read_vtu(folder / "geometry/micro.vtu")
+    return points, classes["penalised"] == 0
+
+
+def micro_with(folder: Path, state: int, l_e: float) -> tuple[np.ndarray, float]:
+    """u (n, 3) by the default method with another cut-off l_E of its energy, from the same start, and
+    its CPU seconds, the factor of a mesh at rest not being needed."""
+    start, config = time.process_time(), read_json(folder / "report/config.json")
+    micro, levels = config["micro"] | {"l_e": l_e}, read_json(folder / "geometry/threshold.json")
+    cell = read_json(folder / "geometry/cell_size.json")["cell_size"]
+    images = [load_volume(folder / f"volumes/smooth{n}.h5")[0] for n in (0, state)]
+    reference = micro_reference(
+        read_mesh(folder / "geometry/micro.vtu"),
+        images[0],
+        load_quadrature(folder / "geometry/shell.h5"),
+    )
+    _, _, weights = elastic(reference, micro_options(micro, cell, settings.loading_axis(config)))
+    order, _ = load_order(folder / "dvc/micro_factor.h5")
+    problem = Problem(reference, weights["c"], micro["nu"], order)
+    u = load_field(folder / f"dvc/micro_start_state{state}.h5")
+    plan = stages(micro, levels), mending(micro, levels)
+    solution, _ = corotational(problem, images[1], u, *plan)
+    return solution.u, time.process_time() - start
 
 
 def rows_of_study(folder: Path, states: Iterable[int]) -> list[dict]:

@@ -17,8 +17,8 @@ with job(snakemake) as log:
     solid = load_volume(folder / "volumes/smooth0.h5")[0]
     threshold = read_json(folder / "geometry/threshold.json")["threshold"]
     transform, cpu = elastix(*images, options, near_solid(solid, threshold))
-    points = bulk_nodes(folder / "geometry/micro.vtu")
-    u = displacement(transform, images[0].shape, points)
-    (found,) = errors_at(truth_of(folder), points, [u], state)
+    points, bulk = bulk_nodes(folder)
+    u = displacement(transform, images[0].shape, points[bulk])
+    (found,) = errors_at(truth_of(folder), points[bulk], [u], state)
     log.info("%s in %.0f CPU-s", found, cpu)
     write_json(snakemake.output[0], found | {"cpu_s": cpu})

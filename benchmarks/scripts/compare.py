@@ -1,4 +1,4 @@
-"""The table of one seed: the workflow's results and elastix by its best settings, state by state."""
+"""The table of a case: the workflow's results and elastix by its best settings, state by state."""
 
 from pathlib import Path
 
@@ -9,10 +9,10 @@ from addvc.images.files import read_json
 from addvc.runtime import job
 
 with job(snakemake):
-    folder, params = Path(snakemake.params.folder), snakemake.params
-    rows = rows_of_study(folder, params.states)
-    runs = zip(params.runs, map(read_json, snakemake.input.peers), strict=True)
-    runs = [dict(run) | found for run, found in runs]
+    given, params = snakemake.input, snakemake.params
+    rows = rows_of_study(Path(params.folder), params.states)
+    rows += [read_json(path) for path in given.varied]
+    runs = [r | read_json(path) for r, path in zip(params.runs, given.peers, strict=True)]
     for tool in dict.fromkeys(run["tool"] for run in runs):
         for state in params.states:
             rows.append(best_of([r for r in runs if (r["tool"], r["state"]) == (tool, state)]))
