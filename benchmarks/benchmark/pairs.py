@@ -30,10 +30,11 @@ AWAY = 1e3
 
 @dataclass(frozen=True)
 class PairOptions:
-    """`side` of the cube; standard deviation of each component of the motion of a junction and of
+    """`side` of the cube, and `size` of the twin that it is cut from; standard deviation of each component of the motion of a junction and of
     the bow of a strut at its middle, voxels; noise in grey levels."""
 
     side: int = 96
+    size: str = "default"
     junction: float = 0.8
     bow: float = 0.6
     noise: float = 2.0
@@ -42,7 +43,9 @@ class PairOptions:
     def twin(self) -> TwinOptions:
         """The twin that foam and images come from; one state, whose strain is a mere label."""
         plain = {"cupping": 0.0, "rings": 0.0, "drift": 0.0, "band": False}
-        return TwinOptions(seed=self.seed, noise=self.noise, strains=(0.01,), **plain)
+        return TwinOptions(
+            size=self.size, seed=self.seed, noise=self.noise, strains=(0.01,), **plain
+        )
 
 
 def cube(network: Network, side: int) -> Network:
