@@ -30,8 +30,9 @@ AWAY = 1e3
 
 @dataclass(frozen=True)
 class PairOptions:
-    """`side` of the cube, and `size` of the twin that it is cut from; standard deviation of each component of the motion of a junction and of
-    the bow of a strut at its middle, voxels; noise in grey levels."""
+    """`side` of the cube, and `size` of the twin that it is cut from; standard deviation of each
+    component of the motion of a junction and of the bow of a strut at its middle, voxels; noise in
+    grey levels."""
 
     side: int = 96
     size: str = "default"
