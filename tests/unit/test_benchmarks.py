@@ -57,10 +57,9 @@ def test_struts_move_each_on_its_own(pair):
     middle = np.array([chain[len(chain) // 2] for chain in strut_nodes(network)])
     inside = ((network.nodes[middle] > 4) & (network.nodes[middle] < OPTIONS.side - 5)).all(axis=1)
     middle = middle[inside]
+    # where another strut is near the truth blends both
     gap = np.linalg.norm(truth.displacement(network.nodes[middle], 1) - u[middle], axis=1)
-    assert (
-        np.median(gap) < 1e-9 and (gap < 0.05).mean() > 0.9
-    )  # not where another strut is near: the truth blends them
+    assert np.median(gap) < 1e-9 and (gap < 0.05).mean() > 0.9
 
 
 def test_least_rotation_takes_one_direction_to_the_other(rng):
