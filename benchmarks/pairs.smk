@@ -1,25 +1,40 @@
 # Pairs of images that are harder than a loaded network: made here, measured by the workflow.
 
 
-rule pair:
+rule strut:
     output:
-        expand(
-            f"{R}/made/{{{{case}}}}/{{name}}",
-            name=["state0.tif", "state1.tif", "motion.h5"],
-        ),
+        expand(f"{R}/made/strut/{{name}}", name=CASES["strut"]["made"]),
     log:
-        f"{R}/logs/pair/{{case}}.log",
+        f"{R}/logs/strut.log",
     benchmark:
-        f"{R}/benchmarks/pair/{{case}}.tsv"
+        f"{R}/benchmarks/strut.tsv"
     threads: 1
     resources:
         mem_mb=1500,
         runtime=10,
     params:
-        code=code("pair.py"),
-        pair=lambda wildcards: config["pairs"][wildcards.case],
+        code=code("strut.py"),
+        strut=config["pairs"]["strut"],
     script:
-        "scripts/pair.py"
+        "scripts/strut.py"
+
+
+rule band:
+    output:
+        expand(f"{R}/made/band/{{name}}", name=CASES["band"]["made"]),
+    log:
+        f"{R}/logs/band.log",
+    benchmark:
+        f"{R}/benchmarks/band.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        code=code("band.py"),
+        band=config["pairs"]["band"],
+    script:
+        "scripts/band.py"
 
 
 rule l_e:

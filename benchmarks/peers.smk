@@ -38,10 +38,9 @@ def found_by_runs(wildcards):
 
 
 def varied(wildcards):
-    """Runs of micro DVC with other cut-offs: of the pairs."""
+    """Runs of micro DVC with other cut-offs."""
     case = PREFIX[wildcards.table]
-    lengths = config["l_e"] if case in config["pairs"] else []
-    return [f"{R}/l_e/{case}_{length}.json" for length in lengths]
+    return [f"{R}/l_e/{case}_{length}.json" for length in config["l_e"].get(case, [])]
 
 
 rule study:

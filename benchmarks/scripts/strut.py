@@ -7,4 +7,4 @@ from benchmark.pairs import PairOptions, write_pair
 from addvc.runtime import job
 
 with job(snakemake):
-    write_pair(Path(snakemake.output[0]).parent, PairOptions(**snakemake.params.pair))
+    write_pair(Path(snakemake.output[0]).parent, PairOptions(**snakemake.params.strut))
