@@ -60,10 +60,12 @@ rule study:
     resources:
         mem_mb=4000,
         runtime=120,
-    shell:
-        "snakemake --configfile {input.config} --cores {threads} --nolock --rerun-incomplete"
-        " results/{wildcards.case}/summary.json results/{wildcards.case}/report/config.json"
-        " >{log} 2>&1 && cp results/{wildcards.case}/summary.json {output}"
+    params:
+        code=code("study.py"),
+        schema=str(BENCHMARKS.parent / "workflow/schemas/config.schema.yaml"),
+        states=lambda wildcards: CASES[wildcards.case]["states"],
+    script:
+        "scripts/study.py"
 
 
 rule elastix:

@@ -66,13 +66,23 @@ def cost_once(folder: Path) -> float:
     )
 
 
-def truth_of(folder: Path) -> Judge:
-    """The truth of a case of the workflow, whose options lie in its folder."""
-    config = read_json(folder / "report/config.json")
+def targets(case: str, states: Iterable[int]) -> list[str]:
+    """What the workflow must make of a case: the errors of all that is compared."""
+    return [
+        f"results/{case}/analysis/error_{name}_state{state}.json"
+        for state in states
+        for name in RESULTS
+    ]
+
+
+def truth_of(config: dict) -> Judge:
+    """The truth of a case of the workflow, from its whole configuration."""
     if settings.case_kind(config) == "twin":
         return load_truth(Path(settings.twin_folder(settings.twin_parts(config)[0]), "motion.h5"))
     if "truth" not in config:
-        raise AddvcError(f"{folder} has neither `twin` nor `truth`: nothing can be compared there")
+        raise AddvcError(
+            f"case {config['case']} has neither `twin` nor `truth`: give one, errors need it"
+        )
     return load_truth(config["truth"])
 
 
@@ -82,10 +92,10 @@ def bulk_nodes(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return points, classes["penalised"] == 0
 
 
-def micro_with(folder: Path, state: int, l_e: float) -> tuple[np.ndarray, float]:
+def micro_with(folder: Path, config: dict, state: int, l_e: float) -> tuple[np.ndarray, float]:
     """u (n, 3) by the default method with another cut-off l_E of its energy, from the same start, and
     its CPU seconds, the factor of a mesh at rest not being needed."""
-    start, config = time.process_time(), read_json(folder / "report/config.json")
+    start = time.process_time()
     micro, levels = config["micro"] | {"l_e": l_e}, read_json(folder / "geometry/threshold.json")
     cell = read_json(folder / "geometry/cell_size.json")["cell_size"]
     images = [load_volume(folder / f"volumes/smooth{n}.h5")[0] for n in (0, state)]

@@ -11,6 +11,7 @@ from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:
+    config = read_json(snakemake.input[0])
     folder, state = Path(snakemake.params.folder), int(snakemake.wildcards.state)
     options = ElastixOptions(float(snakemake.wildcards.spacing), **snakemake.params.settings)
     images = [load_volume(folder / f"volumes/volume{n}.h5")[0] for n in (0, state)]
@@ -19,6 +20,6 @@ with job(snakemake) as log:
     transform, cpu = elastix(*images, options, near_solid(solid, threshold))
     points, bulk = bulk_nodes(folder)
     u = displacement(transform, images[0].shape, points[bulk])
-    (found,) = errors_at(truth_of(folder), points[bulk], [u], state)
+    (found,) = errors_at(truth_of(config), points[bulk], [u], state)
     log.info("%s in %.0f CPU-s", found, cpu)
     write_json(snakemake.output[0], found | {"cpu_s": cpu})
