@@ -15,6 +15,7 @@ from addvc.twin import Truth
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
+from benchmark.band import Band  # noqa: E402
 from benchmark.pairs import PairOptions, make_pair, strut_nodes, turned  # noqa: E402
 from benchmark.tables import best_of, fill, with_ratio, write_csv  # noqa: E402
 
@@ -66,6 +67,16 @@ def test_least_rotation_takes_one_direction_to_the_other(rng):
     a, b = rng.standard_normal((2, 20, 3))
     unit = lambda v: v / np.linalg.norm(v, axis=1)[:, None]  # noqa: E731
     assert_allclose(np.einsum("nij,nj->ni", turned(a, b), unit(a)), unit(b), atol=1e-12)
+
+
+def test_band_is_pulled_back_to_where_it_came_from(rng):
+    band = Band()
+    x = rng.uniform(0, 95, (500, 3))
+    u = band.displacement(x)
+    assert_allclose(band.pulled_back(x + u), x, atol=1e-4)
+    step = 1e-4 * band.normal
+    slope = (band.displacement(x + step) - band.displacement(x - step))[:, 1] / 2e-4
+    assert slope.min() == pytest.approx(-band.strain, rel=0.02)
 
 
 ROWS = [
