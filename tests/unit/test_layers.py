@@ -29,6 +29,8 @@ JUDGES = {
 JUDGING = {
     "truth_error",
     "struts_truth",
+    "uncertainty_truth",
+    "cells_truth",
     "difficulty",
     "twin_check",
 }  # rules and scripts that may read its truth

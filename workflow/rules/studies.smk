@@ -61,6 +61,11 @@ if STATES:
             labels={"figure": Path(name).stem.replace("more_", ""), "shows": shows},
         )
 
+    def starts_on_variant(wildcards):
+        """The candidate starts of micro DVC at the nodes of a variant's mesh."""
+        folder = V.format(**wildcards)
+        return [path.replace(R, folder, 1) for path in starts_on_micro(wildcards)]
+
     rule varied_threshold:
         input:
             smooth=f"{R}/volumes/smooth0.h5",
@@ -160,16 +165,18 @@ if STATES:
         benchmark:
             f"{V_TIMES}/transfer_state{{state}}.tsv"
 
-    use rule freeform_on as variant_freeform with:
+    use rule field_on_micro as variant_field with:
         input:
+            unpack(field_files),
             mesh=given("classes"),
-            solution=f"{R}/dvc/freeform_state{{state}}.h5",
+            reference=f"{R}/volumes/smooth0.h5",
+            deformed=f"{R}/volumes/smooth{{state}}.h5",
         output:
-            temp(f"{V}/dvc/freeform_on_micro_state{{state}}.h5"),
+            temp(f"{V}/dvc/{{field}}_on_micro_state{{state}}.h5"),
         log:
-            f"{V_LOGS}/freeform_on_state{{state}}.log",
+            f"{V_LOGS}/{{field}}_on_micro_state{{state}}.log",
         benchmark:
-            f"{V_TIMES}/freeform_on_state{{state}}.tsv"
+            f"{V_TIMES}/{{field}}_on_micro_state{{state}}.tsv"
 
     use rule micro_start as variant_start with:
         input:
@@ -178,10 +185,7 @@ if STATES:
             deformed=f"{R}/volumes/smooth{{state}}.h5",
             threshold=given("threshold"),
             cell_size=f"{R}/geometry/cell_size.json",
-            candidates=[
-                f"{V}/dvc/{name}_on_micro_state{{state}}.h5"
-                for name in [FINEST, *FREEFORM]
-            ],
+            candidates=starts_on_variant,
         output:
             temp(own("start")),
         log:

@@ -108,10 +108,15 @@ def robust_scale(setting: str | float, levels: dict) -> float | None:
     return float(setting)
 
 
+def turns(section: dict, method: str) -> bool:
+    """Whether the frame of a method turns with the struts; `section`: `micro` of a configuration."""
+    return bool(section["rotated"]) and method not in ("eq10", "without_rotation")
+
+
 def stages(section: dict, levels: dict, method: str = "corotational") -> list[Stage]:
     """Stages of micro DVC from the `micro` section of a configuration and the grey `levels` of the
     threshold (void, solid, noise); all but the last end early (`correlation.corotational.early`)."""
-    rotated = section["rotated"] and method != "without_rotation"
+    rotated = turns(section, method)
     scale = None if method == "without_robust" else robust_scale(section["robust"], levels)
     last = Stop(section["tolerance"], section["max_iterations"])
     ends = [early(last)] * (section["stages"] - 1) + [last]
