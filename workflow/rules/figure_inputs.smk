@@ -85,18 +85,23 @@ def shown(name, number, category, shows):
     """A figure of the report and of the list of all figures, with its caption.
 
     One label only: of a chapter with two figures snakemake's report would make a switch of the second
-    label, and fail on it."""
+    label, and fail on it. A table is a CSV, and a page (.html) that the report shows.
+    """
     FIGURES.append(f"{R}/figures/{name}")
+    page = name.replace(".csv", ".html")
+    if page != name:
+        FIGURES.append(f"{R}/figures/{page}")
     caption = f"../report/{number}.rst"
     words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
     words = words.replace("table", "Table ") + ": "
-    name = shows if number.startswith("more") else words + shows
-    return report(
-        FIGURES[-1],
+    label = shows if number.startswith("more") else words + shows
+    found = report(
+        f"{R}/figures/{page}",
         category=CHAPTERS[category],
         caption=caption,
-        labels={"figure": name},
+        labels={"figure": label},
     )
+    return found if page == name else [f"{R}/figures/{name}", found]
 
 
 def drawing(name):

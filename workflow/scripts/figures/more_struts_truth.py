@@ -7,5 +7,7 @@ from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)
-    write_table(snakemake.output.table, truth_rows(case))
+    rows = truth_rows(case)
+    for path in snakemake.output.table:
+        write_table(path, rows)
     against_truth(case, snakemake.output.pictures)
