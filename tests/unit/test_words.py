@@ -1,20 +1,29 @@
 """The words that go with the numbers: closing lines, front page, warnings, strictness."""
 
 import copy
+from pathlib import Path
 
 import docutils.core
 import docutils.nodes
 import pytest
+from snakemake.utils import validate
 
 from addvc.errors import AddvcError
 from addvc.report.words import check_verdicts, closing_lines, front_page, micro_name, warnings
 
-CONFIG = {"case": "foam-2_b", "scans": {"reference": "scans/*.tif"}, "micro": {"methods": ["eq10"]}}
+CONFIG = {
+    "case": "foam-2_b",
+    "porosity": 0.96,
+    "scans": {"reference": "scans/*.tif", "states": ["2/_a_/|x|"], "voxel_size_um": 6.67},
+    "micro": {"methods": ["eq10"]},
+}
+validate(CONFIG, str(Path(__file__).parents[2] / "workflow/schemas/config.schema.yaml"))
 SCANS = {
     "scans": [
         {"path": path, "shape": [72, 84, 72], "dtype": "uint8", "fingerprint": "ab" * 32}
         for path in ("scans/reference.tif", "/data/state_1/slice*.tif", "scans/*.tif", "2/_a_/|x|")
-    ]
+    ],
+    "bin": 1,
 }
 MESH = {
     "nodes": 283, "cells": 1112, "mean_edge": 12.06, "mean_volume": 147.5, "min_dihedral": 10.2,
@@ -66,7 +75,7 @@ def summary(*states):
         "states": list(states),
         "cost": {"volume": {"jobs": 2, "cpu_s": 1.0, "wall_s": 2.0, "max_rss_mb": 99.0},
                  "micro_dvc": {"jobs": 1, "cpu_s": 9.0, "wall_s": 9.0, "max_rss_mb": 300.0}},
-        "versions": {"addvc": "0.1.0", "numpy": "2.1"},
+        "versions": {"addvc": "0.1.0", "numpy": "2.1", "commit": "ab12"},
     }  # fmt: skip
 
 
@@ -142,7 +151,8 @@ def test_the_front_page_is_valid(states):
 def test_the_front_page_has_its_parts_in_order():
     parts = list(sections(front_page(summary(*ALL), CONFIG, SCANS)))
     assert parts == ["Warnings and failures", "Residual and error of each mesh", "Convergence",
-                     "Meshes", "Cost", "Scans", "Configuration", "Versions"]  # fmt: skip
+                     "Meshes", "Cost", "Methods, to paste", "Scans", "Configuration",
+                     "Versions"]  # fmt: skip
 
 
 def test_the_front_page_answers_first():
@@ -154,6 +164,29 @@ def test_the_front_page_answers_first():
     assert "State 4 (4.4 %; 4.4% measured): **FAILED: not to be used**, 20.0% of" in head
 
 
+def test_the_front_page_tells_of_a_band():
+    band = {"normal": [0, 1, 0], "thickness": 24.6, "angle": 23.9, "flatness": 0.4,
+            "band_strain_share": 0.225, "band_volume_share": 0.131}  # fmt: skip
+    told = front_page(summary(GOOD | {"cells": band}), CONFIG, SCANS)
+    assert "22% of the compression is in a band with 13% of the volume, 25 voxels thick" in told
+    assert "24 degrees" in told
+    lump = front_page(summary(GOOD | {"cells": band | {"flatness": 0.9}}), CONFIG, SCANS)
+    assert "a lump" in lump and "24 degrees" not in lump
+    assert "band" not in front_page(summary(GOOD | {"cells": dict.fromkeys(band)}), CONFIG, SCANS)
+
+
+def test_the_front_page_leads_to_the_scene_and_to_paraview():
+    head = front_page(summary(GOOD), CONFIG, SCANS).split("Warnings and failures")[0]
+    links = docutils.core.publish_doctree(head).findall(docutils.nodes.reference)
+    assert [link["refuri"] for link in links] == ["scene.html", "fields/micro.pvd"]
+    assert "scene.html" not in front_page(summary(), CONFIG, SCANS)
+
+
+def test_the_front_page_tells_the_cost():
+    head = front_page(summary(GOOD), CONFIG, SCANS).split("Warnings and failures")[0]
+    assert "0.2 minutes of CPU" in head and "9 s a job of micro DVC" in head and "0.3 GB" in head
+
+
 def test_the_tables_of_the_front_page_hold_the_numbers():
     parts = sections(front_page(summary(*ALL), CONFIG, SCANS))
     assert "0.033" in parts["Residual and error of each mesh"]
@@ -163,6 +196,9 @@ def test_the_tables_of_the_front_page_hold_the_numbers():
     assert "methods:" in parts["Configuration"]
     for row in SCANS["scans"]:
         assert row["path"] in parts["Scans"]
+    hashed = SCANS | {"sha256": {"2/_a_/|x|": "cd" * 32}}
+    scans = sections(front_page(summary(*ALL), CONFIG, hashed))["Scans"]
+    assert f"{'cd' * 32}  2/_a_/|x|" in scans
 
 
 def test_without_a_truth_there_are_no_columns_of_errors():
@@ -199,6 +235,13 @@ def test_a_meso_loop_that_did_not_end_has_a_warning():
     one = copy.deepcopy(GOOD)
     one["meso12"] = found(converged=False)
     assert "State 1, meso12: the loop did not end in 40 iterations" in warnings(summary(one))[0]
+
+
+@pytest.mark.parametrize(("flagged", "warned"), [(9, False), (15, True)])
+def test_many_flagged_struts_have_a_warning(flagged, warned):
+    one = GOOD | {"struts": {"valid": 100, "flagged": flagged, "bending_share": 0.7}}
+    text = "\n".join(warnings(summary(one)))
+    assert (f"State 1: {flagged} of {100 + flagged} struts (at most 10 %)" in text) == warned
 
 
 @pytest.mark.parametrize(("kept", "warned"), [(0.91, False), (0.85, True)])

@@ -109,8 +109,17 @@ def test_the_report_holds_everything_and_fetches_nothing(results):
     assert re.findall(rf"{tags}[^>]*?\b(?:src|href|data)\s*=\s*{away}[^>]*>", text) == []
     assert re.findall(rf"url\(\s*{away}|@import\s+{away}", text) == []
     assert "Warnings and failures" in text
+    assert "align-items: flex-start" in text, "its first page can be reached in a browser"
+    labels = [json.loads(found) for found in re.findall(r'"labels": (\{.*?\})', text)]
+    assert len(labels) > 15 and all(len(one) == 1 for one in labels), "two may become a switch"
     for name in figures():
         assert name in text
+
+
+def test_there_is_a_scene_and_a_series_of_each_mesh(results):
+    assert 4e6 < (results / "scene.html").stat().st_size < 25e6
+    states = {path.name.partition("_state")[0] for path in results.glob("fields/*.vtu")}
+    assert {path.stem for path in results.glob("fields/*.pvd")} == states
 
 
 def figures():
@@ -141,6 +150,7 @@ def test_fields_open_in_other_programs(results, summary, mesh, state):
     assert field.point_data["displacement"].shape == (nodes, 3)
     assert np.isfinite(field.point_data["displacement"]).all()
     assert set(np.unique(field.point_data["valid"])) <= {0, 1}
+    assert ("uncertainty" in field.point_data) == (mesh == "micro")
     valid = summary["states"][state - 1][mesh]["valid_nodes"]
     assert field.point_data["valid"].mean() == pytest.approx(valid)
     strain = field.cell_data["strain"][0].reshape(-1, 3, 3)

@@ -2,6 +2,16 @@
 
 FIGURE_CASE = {"root": R, "labels": LABELS, "meso": MESO, "micro": MICRO}
 FIGURES = []
+CHAPTERS = {  # the order of the paper, then what is beyond it; snakemake sorts them
+    "Specimen": "1 Specimen",
+    "Meshes": "2 Meshes",
+    "Mesoscale DVC": "3 Mesoscale DVC",
+    "Microscale DVC": "4 Microscale DVC",
+    "Tables": "5 Tables",
+    "Struts": "6 Beyond the paper: struts",
+    "Quality": "7 Beyond the paper: quality",
+    "Synthetic test": "8 Beyond the paper: the synthetic test",
+}
 SPECIMEN = [f"{R}/geometry/specimen.json", f"{R}/geometry/threshold.json"]
 
 
@@ -30,8 +40,12 @@ def residuals(*names):
 
 
 def fields(*names):
-    """Fields with the validity of each node, in every state."""
-    return expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES)
+    """Fields with the validity of each node, in every state; of `micro` that of the struts too."""
+    struts = f"{R}/struts_state{{state}}.json" if MICRO[0] in names else []
+    return [
+        *expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES),
+        *expand(struts, state=STATES),
+    ]
 
 
 def struts():
@@ -50,17 +64,38 @@ def struts_truth(suffix):
     return expand(name, state=STATES) if HAS_TRUTH else []
 
 
+def uncertainty_truth():
+    """Errors against their uncertainty, where there is a truth."""
+    name = f"{R}/analysis/uncertainty_truth_state{{state}}.json"
+    return expand(name, state=STATES) if HAS_TRUTH else []
+
+
+def cells():
+    """Strain of cells, and its bands, in every state; the truth of both, where there is one."""
+    names = ["cells", *(["analysis/cells_truth"] if HAS_TRUTH else [])]
+    return expand(
+        f"{R}/{{name}}_state{{state}}.{{suffix}}",
+        name=names,
+        state=STATES,
+        suffix=["csv", "json"],
+    )
+
+
 def shown(name, number, category, shows):
-    """A figure of the report and of the list of all figures, with its caption."""
+    """A figure of the report and of the list of all figures, with its caption.
+
+    One label only: of a chapter with two figures snakemake's report would make a switch of the second
+    label, and fail on it."""
     FIGURES.append(f"{R}/figures/{name}")
     caption = f"../report/{number}.rst"
     words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
-    words = words.replace("table", "Table ").replace("more_", "")
+    words = words.replace("table", "Table ") + ": "
+    name = shows if number.startswith("more") else words + shows
     return report(
         FIGURES[-1],
-        category=category,
+        category=CHAPTERS[category],
         caption=caption,
-        labels={"figure": words, "shows": shows},
+        labels={"figure": name},
     )
 
 

@@ -1,10 +1,16 @@
-# The first page, the report, the words at the end of a run.
+# The first page, the report, what to look around in, the words at the end of a run.
+
+LOOK_AROUND = [
+    *expand(f"{R}/fields/{{mesh}}.pvd", mesh=RESULTS),
+    *([f"{R}/scene.html"] if STATES else []),
+]
 
 
 rule front_page:
     input:
         summary=f"{R}/summary.json",
         scans=f"{R}/input.json",
+        hashes=f"{R}/input_hashes.json",
     output:
         page=f"{R}/report/front.rst",
         config=f"{R}/report/config.json",
@@ -25,6 +31,56 @@ rule front_page:
         "../scripts/report/front_page.py"
 
 
+rule series:
+    input:
+        fields(*RESULTS),
+    output:
+        expand(f"{R}/fields/{{mesh}}.pvd", mesh=RESULTS),
+    log:
+        f"{R}/logs/series/all.log",
+    benchmark:
+        f"{R}/benchmarks/series/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 0.1),
+        runtime=5,
+    params:
+        code=code("report/series.py"),
+        states=STATES,
+    script:
+        "../scripts/report/series.py"
+
+
+if STATES:
+
+    rule scene:
+        input:
+            SPECIMEN,
+            smooth(0),
+            meshes("micro"),
+            struts(),
+            template=str(WORKFLOW / "report/scene.html"),
+        output:
+            f"{R}/scene.html",
+        log:
+            f"{R}/logs/scene/all.log",
+        benchmark:
+            f"{R}/benchmarks/scene/all.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, 10.0),
+            runtime=15,
+        params:
+            code=code("report/scene.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/report/scene.py"
+
+
 rule figures:
     input:
         FIGURES,
@@ -37,6 +93,7 @@ rule report:
         FIGURES,
         page=f"{R}/report/front.rst",
         config=f"{R}/report/config.json",
+        stylesheet=str(WORKFLOW / "report/report.css"),
         captions=sorted(map(str, (WORKFLOW / "report").glob("*.rst"))),
     output:
         f"{R}/report.html",

@@ -28,6 +28,28 @@ rule check_input:
         "../scripts/scans/check_input.py"
 
 
+rule input_hashes:
+    input:
+        [scan_input(state) for state in [0, *STATES]],
+    output:
+        f"{R}/input_hashes.json",
+    log:
+        f"{R}/logs/input_hashes/all.log",
+    benchmark:
+        f"{R}/benchmarks/input_hashes/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 0.0),
+        runtime=60,
+    params:
+        code=code("scans/input_hashes.py"),
+        scans={scan_path(state): scan_input(state) for state in [0, *STATES]},
+    script:
+        "../scripts/scans/input_hashes.py"
+
+
 rule volume:
     input:
         checked=f"{R}/input.json",

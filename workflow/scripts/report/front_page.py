@@ -8,7 +8,8 @@ from addvc.runtime import job
 
 with job(snakemake):
     summary = read_json(snakemake.input.summary)
-    text = front_page(summary, snakemake.config, read_json(snakemake.input.scans))
+    scans = read_json(snakemake.input.scans) | {"sha256": read_json(snakemake.input.hashes)}
+    text = front_page(summary, snakemake.config, scans)
     with atomic_path(snakemake.output.page) as temporary:
         Path(temporary).write_text(text)
     write_json(snakemake.output.config, snakemake.config)

@@ -8,5 +8,6 @@ with job(snakemake):
         snakemake.output[0],
         snakemake.params.snakefile,
         snakemake.input.config,
+        snakemake.input.stylesheet,
         snakemake.params.target,
     )

@@ -2,6 +2,7 @@
 
 import ast
 import hashlib
+import subprocess
 from functools import cache
 from pathlib import Path
 
@@ -59,3 +60,14 @@ def code_hash(script: str | Path) -> str:
     for file in sorted(closure(Path(script).resolve())):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def commit(folder: Path = PACKAGE) -> str:
+    """The commit that a folder of a Git repository is at, with "-dirty" when files of it have been
+    changed since; "unknown" where there is no repository, or no git."""
+    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        done = subprocess.run([*command, "--abbrev=40"], capture_output=True, text=True, timeout=30)
+    except (OSError, subprocess.TimeoutExpired):
+        return "unknown"
+    return done.stdout.strip() if done.returncode == 0 else "unknown"

@@ -48,3 +48,11 @@ def read_mesh(path: str | Path) -> Mesh:
     """The mesh of a VTU file, without its fields."""
     points, cells, _, _ = read_vtu(path)
     return Mesh(points, cells)
+
+
+def write_series(path: str | Path, files: dict[float, str]) -> None:
+    """Files of a folder, by their time, as a collection (.pvd in it) that ParaView steps through."""
+    rows = [f'<DataSet timestep="{time}" file="{name}"/>' for time, name in files.items()]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
+    with atomic_path(path) as temporary:
+        temporary.write_text(head + "\n".join(rows) + "\n</Collection>\n</VTKFile>\n")

@@ -12,7 +12,9 @@ from addvc.images.files import atomic_path
 log = logging.getLogger(__name__)
 
 
-def build_report(output: str | Path, snakefile: str, config: str, target: str) -> None:
+def build_report(
+    output: str | Path, snakefile: str, config: str, stylesheet: str, target: str
+) -> None:
     """Write `output` (.html, all figures inside, no network needed) for the rule `target`.
 
     Runs within the run that makes it, hence without taking its lock. Raises AddvcError with the
@@ -25,6 +27,8 @@ def build_report(output: str | Path, snakefile: str, config: str, target: str) -
             target,
             "--report",
             str(temporary),
+            "--report-stylesheet",
+            stylesheet,
             "--nolock",
             "--snakefile",
             snakefile,

@@ -3,6 +3,7 @@
 import yaml
 
 from addvc.errors import AddvcError
+from addvc.report.methods import methods
 
 VERDICTS = {
     "converged": "converged",
@@ -74,13 +75,14 @@ def heading(text: str, line: str = "-") -> list[str]:
 def front_page(summary: dict, config: dict, scans: dict) -> str:
     """First page of the report (reStructuredText): the answer, what to distrust, the provenance."""
     lines = heading(f"addvc: case {summary['case']}", "=")
-    lines += answer(summary)
+    lines += answer(summary) + look_around(summary)
     lines += heading("Warnings and failures") + warnings(summary)
     lines += heading("Residual and error of each mesh") + results_table(summary)
     lines += heading("Convergence") + convergence_table(summary)
     lines += heading("Meshes") + meshes_table(summary)
     lines += heading("Cost") + cost_table(summary["cost"])
-    lines += heading("Scans") + scans_table(scans)
+    lines += heading("Methods, to paste") + methods(summary, config, scans)
+    lines += heading("Scans") + scans_table(scans) + hashes_list(scans.get("sha256", {}))
     lines += [*heading("Configuration"), "::", ""]
     lines += ["   " + line for line in yaml.safe_dump(config, sort_keys=False).splitlines()]
     lines += heading("Versions")
@@ -104,8 +106,33 @@ def answer(summary: dict) -> list[str]:
             f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
             f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
             f"valid{error_words(found['error'])}.{strut_words(state.get('struts'))}"
+            + band_words(state.get("cells"))
         )
-    return lines
+    return [*lines, "", cost_words(summary["cost"])]
+
+
+def cost_words(cost: dict) -> str:
+    """What it took, in a sentence."""
+    cpu, memory = (sum(c["cpu_s"] for c in cost.values()), [c["max_rss_mb"] for c in cost.values()])
+    micro = cost.get("micro_dvc", {"cpu_s": 0.0, "jobs": 0})
+    each = f", {micro['cpu_s'] / micro['jobs']:.0f} s a job of micro DVC" if micro["jobs"] else ""
+    return (
+        f"It took {cpu / 60:.1f} minutes of CPU without figures{each}, and at most "
+        f"{max(memory, default=0) / 1000:.1f} GB of memory in a job."
+    )
+
+
+def look_around(summary: dict) -> list[str]:
+    """Where the result can be seen in 3D: links that hold beside the report, with the folder."""
+    if not summary["states"]:
+        return []
+    name = micro_name(summary)
+    return [
+        "",
+        "Look around in 3D, in this browser and without a network: `scene.html <scene.html>`__ (beside "
+        f"this file). ParaView opens all states at once: `fields/{name}.pvd <fields/{name}.pvd>`__, "
+        "then Filters, Warp By Vector with `displacement`; each other mesh has a file like it.",
+    ]
 
 
 def strut_words(struts: dict | None) -> str:
@@ -116,8 +143,26 @@ def strut_words(struts: dict | None) -> str:
     if struts["bending_share"] is None:
         return f" No share of bending: {count}."
     verdict = "Bending" if struts["bending_share"] > 0.5 else "Not bending"
-    share = f"{struts['bending_share']:.0%} of the energy of {count} is in bending"
+    doubt = struts.get("bending_share_std")
+    more = f" (standard deviation {doubt:.1%})" if doubt else ""
+    share = f"{struts['bending_share']:.0%}{more} of the energy of {count} is in bending"
     return f" {verdict}-dominated: {share}."
+
+
+def band_words(cells: dict | None) -> str:
+    """Where the strain of cells gathers, if it does."""
+    if not cells or cells["normal"] is None:
+        return ""
+    shape = (
+        f"{cells['thickness']:.0f} voxels thick, its normal {cells['angle']:.0f} degrees from the "
+        "loading axis"
+        if cells["flatness"] < 0.7
+        else "a lump rather than a plate"
+    )
+    return (
+        f" {cells['band_strain_share']:.0%} of the compression is in a band with "
+        f"{cells['band_volume_share']:.0%} of the volume, {shape}."
+    )
 
 
 def warnings(summary: dict) -> list[str]:
@@ -130,6 +175,7 @@ def warnings(summary: dict) -> list[str]:
             f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
             "and was left out; lower mesh.size, the porosity or images.blur."
         )
+    found += topology_warnings(summary.get("topology"))
     if not any(state[micro_name(summary)]["error"] for state in summary["states"]):
         found.append(
             "- The error on these images is not known: the residual and the ultimate error "
@@ -141,6 +187,23 @@ def warnings(summary: dict) -> list[str]:
         for check in failed_checks(summary)
     ]
     return found or ["None."]
+
+
+def topology_warnings(counts: dict | None) -> list[str]:
+    """One line when the mesh of the struts has stubs, necks or welds."""
+    names = {
+        "stubs": "dangling stubs",
+        "necks": "necks thinner than a square voxel",
+        "welds": "welds torn by the displacement",
+    }
+    some = [f"{counts[key]} {name}" for key, name in names.items() if counts and counts[key]]
+    if not some:
+        return []
+    return [
+        f"- The mesh of the struts has {', '.join(some)} (0 of each in a foam): see the figure of "
+        "its topology, and geometry/topology.json for where. Elastic energy (`corotational`) holds "
+        "them; trust `eq10` least there. Lower images.blur or mesh.size, or change porosity."
+    ]
 
 
 def state_warnings(state: dict, summary: dict) -> list[str]:
@@ -161,6 +224,14 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
             f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
             "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
             "look at the residual maps (Fig. 13)."
+        )
+    struts = state.get("struts") or {"valid": 0, "flagged": 0}
+    count = struts["valid"] + struts["flagged"]
+    if struts["flagged"] > 0.1 * count:
+        found.append(
+            f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
+            "flagged: broken by the threshold, not measured, or on nodes in doubt. What is said of "
+            "bending leaves them out; the scene shows where they are."
         )
     if state["verdict"] == "failed":
         found.append(
@@ -260,17 +331,20 @@ def cost_table(cost: dict) -> list[str]:
 
 
 def scans_table(scans: dict) -> list[str]:
-    """The input files with their fingerprints."""
+    """The input files."""
     rows = [
-        [
-            f"``{row['path']}``",
-            " x ".join(map(str, row["shape"])),
-            row["dtype"],
-            row["fingerprint"][:16],
-        ]
+        [f"``{row['path']}``", " x ".join(map(str, row["shape"])), row["dtype"]]
         for row in scans["scans"]
     ]
-    return list_table(["file", "shape, voxels", "type", "fingerprint"], rows)
+    return list_table(["file", "shape, voxels", "type"], rows)
+
+
+def hashes_list(hashes: dict[str, str]) -> list[str]:
+    """SHA-256 of the files of each scan."""
+    if not hashes:
+        return []
+    rows = [f"   {number}  {path}" for path, number in hashes.items()]
+    return ["SHA-256 (of several files: one after the other)::", "", *rows, ""]
 
 
 def check_verdicts(summary: dict, strict: bool) -> None:

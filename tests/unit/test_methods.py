@@ -1,0 +1,112 @@
+"""The methods to paste: what was done is told, nothing else; each reference is cited, in order."""
+
+import re
+from pathlib import Path
+
+import pytest
+from snakemake.utils import validate
+
+from addvc.images.hashes import content_hash
+from addvc.provenance import commit
+from addvc.report.methods import REFERENCES, Citations, listing, methods, span
+
+ROOT = Path(__file__).parents[2]
+MESH = {"nodes": 71416, "cells": 239573, "mean_edge": 12.34, "mean_volume": 0.117,
+        "ultimate_error": 4.66e-4}  # fmt: skip
+SCANS = {"scans": [{"shape": [120, 140, 120]}] * 3, "bin": 3}
+
+
+def state(number, converged=True, error=None):
+    found = {
+        "converged": converged,
+        "residual_std": 1.0 + number,
+        "valid_nodes": 0.99,
+        "error": error,
+    }
+    struts = {"valid": 340, "bending_share": 0.7 + 0.05 * number}
+    return {"label": f"{number} %", "micro": found, "struts": struts, "cells": {"bands": 1}}
+
+
+def summary(*states):
+    return {"cell_size": 28.8, "threshold": 47.8, "porosity": 0.96, "voxel_size_um": 20.01,
+            "meshes": {"meso33": MESH, "meso12": MESH, "micro": MESH}, "states": list(states),
+            "versions": {"addvc": "0.1.0", "commit": "ab12"}}  # fmt: skip
+
+
+def config(**micro):
+    given = {"case": "foam", "porosity": 0.96, "twin": {}, "micro": micro}
+    validate(given, str(ROOT / "workflow/schemas/config.schema.yaml"))
+    return given
+
+
+def told(settings, *states):
+    return "\n".join(methods(summary(*states or (state(1), state(2))), settings, SCANS))
+
+
+def test_the_numbers_are_those_of_the_summary():
+    text = told(config(), state(1, error={"median": 0.076}), state(2, error={"median": 0.113}))
+    for words in ("commit ab12", "(3, of 120 x 140 x 120 voxels of 6.67 micrometres, binned by 3",
+                  "is 28.8 voxels", "239573 tetrahedra", "12.3 and 12.3 voxels", "4.7e-04 voxel",
+                  "2.00 to 3.00 grey levels", "75 to 80 %", "0.076 to 0.113 voxel",
+                  "as that of corotational did in every state"):  # fmt: skip
+        assert words in text
+    assert "which that of corotational did not at 2 %" in told(
+        config(), state(1), state(2, converged=False)
+    )
+    assert "truth" not in told(config())
+
+
+def test_each_method_is_told_with_what_it_uses():
+    both = told(config())
+    assert "Geman-McClure" in both and "in a frame that turns" in both
+    assert (
+        "For comparison: the squared residual in the struts, regularised by the equilibrium" in both
+    )
+    paper = told(config(methods=["eq10"]))
+    assert "Geman-McClure" not in paper and "turns" not in paper and "(eq10)" in paper
+    assert "carried by their neighbours" in both and "neighbours" not in paper
+    plain = told(config(methods=["corotational"], robust="none", rotated=False, shell=0, mending=0))
+    for word in ("neighbours", "Geman-McClure", "turns", "void within", "equilibrium gap"):
+        assert word not in plain
+    assert "Labelle" not in told(config() | {"mesh": {"backend": "pytetwild"}})
+
+
+@pytest.mark.parametrize("chosen", [["corotational", "eq10"], ["eq10"]])
+def test_references_are_numbered_in_order_and_all_are_cited(chosen):
+    text = told(config(methods=chosen))
+    body, listed = text.split("| [1]", 1)
+    cited = [int(n) for n in re.findall(r"\[(\d+)\]", body)]
+    assert list(dict.fromkeys(cited)) == list(range(1, max(cited) + 1))
+    assert [int(n) for n in re.findall(r"\| \[(\d+)\]", "| [1]" + listed)] == sorted(set(cited))
+    assert "{" not in text
+
+
+def test_every_reference_is_used_and_none_is_made_up():
+    assert set(REFERENCES) == {
+        name
+        for name, words in REFERENCES.items()
+        if words.split(".")[0] in told(config(methods=["corotational", "eq10"]))
+    }
+    with pytest.raises(KeyError):
+        "{nobody}".format_map(Citations())
+
+
+def test_lists_and_ranges():
+    assert listing(["a"]) == "a" and listing(["a", "b", "c"]) == "a, b and c"
+    assert listing(["a", "b"], "or") == "a or b"
+    assert span([2, 1], ".1f") == "1.0 to 2.0" and span([1.0, 1.01], ".1f") == "1.0"
+
+
+# ------------------------------------------------------------------------------ provenance
+
+
+def test_the_hash_is_that_of_the_bytes(tmp_path):
+    (tmp_path / "a").write_bytes(b"ab")
+    (tmp_path / "b").write_bytes(b"c")
+    known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"  # "abc", FIPS 180-2
+    assert content_hash([tmp_path / "a", tmp_path / "b"]) == known
+
+
+def test_the_commit_is_known_in_a_repository_only(tmp_path):
+    assert commit(tmp_path) == "unknown"
+    assert re.fullmatch(r"[0-9a-f]{40}(-dirty)?|unknown", commit())

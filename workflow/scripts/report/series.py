@@ -1,0 +1,11 @@
+"""The states of each mesh as one series that ParaView opens."""
+
+from pathlib import Path
+
+from addvc.fem.io import write_series
+from addvc.runtime import job
+
+with job(snakemake):
+    for path in snakemake.output:
+        name = Path(path).stem
+        write_series(path, {n: f"{name}_state{n}.vtu" for n in snakemake.params.states})

@@ -1,0 +1,207 @@
+"""Methods to paste into a paper, with references, from the configuration and the numbers."""
+
+from addvc.config import loading_axis, micro_names
+from addvc.correlation.micro import micro_options
+from addvc.report import style
+
+REFERENCES = {
+    "addvc": "Rouwane A, Doumalin P, Bouclier R, Passieux JC, Périé JN. Architecture-driven digital "
+    "volume correlation: application to the analysis of in-situ crushing of a polyurethane foam. "
+    "Experimental Mechanics (2023). doi:10.1007/s11340-023-00957-8",
+    "addict": "Rouwane A, Bouclier R, Passieux JC, Périé JN. Architecture-driven digital image "
+    "correlation technique (ADDICT) for the measurement of sub-cellular kinematic fields in "
+    "speckle-free cellular materials. International Journal of Solids and Structures 234-235, 111223 "
+    "(2022)",
+    "snakemake": "Mölder F et al. Sustainable data analysis with Snakemake. F1000Research 10, 33 (2021)",
+    "dvc": "Roux S, Hild F, Viot P, Bernard D. Three-dimensional image correlation from X-ray computed "
+    "tomography of solid foam. Composites Part A 39(8), 1253-1265 (2008)",
+    "spline": "Unser M. Splines: a perfect fit for signal and image processing. IEEE Signal Processing "
+    "Magazine 16(6), 22-38 (1999)",
+    "freeform": "Rueckert D, Sonoda LI, Hayes C, Hill DLG, Leach MO, Hawkes DJ. Nonrigid registration "
+    "using free-form deformations: application to breast MR images. IEEE Transactions on Medical "
+    "Imaging 18(8), 712-721 (1999)",
+    "stuffing": "Labelle F, Shewchuk JR. Isosurface stuffing: fast tetrahedral meshes with good "
+    "dihedral angles. ACM Transactions on Graphics 26(3), 57 (2007)",
+    "gap": "Claire D, Hild F, Roux S. A finite element formulation to identify damage fields: the "
+    "equilibrium gap method. International Journal for Numerical Methods in Engineering 61(2), 189-208 "
+    "(2004)",
+    "robust": "Geman S, McClure DE. Bayesian image analysis: an application to single photon emission "
+    "tomography. Proceedings of the Statistical Computing Section, American Statistical Association, "
+    "12-18 (1985)",
+    "limits": "Leclerc H, Périé JN, Hild F, Roux S. Digital volume correlation: what are the limits to "
+    "the spatial resolution? Mechanics & Industry 13(6), 361-371 (2012)",
+    "bending": "Deshpande VS, Ashby MF, Fleck NA. Foam topology: bending versus stretching dominated "
+    "architectures. Acta Materialia 49(6), 1035-1040 (2001)",
+    "gradient": "Zimmerman JA, Bammann DJ, Gao H. Deformation gradients for continuum mechanical "
+    "analysis of atomistic simulations. International Journal of Solids and Structures 46(2), 238-253 "
+    "(2009)",
+}  # fmt: skip
+
+STARTS = {
+    "zero": "no displacement",
+    "platens": "a coarse grid that holds the platens",
+    "freeform": "a free-form displacement on cubic B-splines {freeform}",
+}
+
+
+class Citations(dict):
+    """Gives each key its number, [1], [2], ..., in the order of first use, for `str.format_map`."""
+
+    def __missing__(self, key: str) -> str:
+        if key not in REFERENCES:
+            raise KeyError(key)
+        self[key] = f"[{len(self) + 1}]"
+        return self[key]
+
+    def listed(self) -> list[str]:
+        """The references that were used, a line each."""
+        return [f"{number} {REFERENCES[key]}." for key, number in self.items()]
+
+
+def methods(summary: dict, config: dict, scans: dict) -> list[str]:
+    """Paragraphs, then the references, as lines of reStructuredText."""
+    cite = Citations()
+    parts = [images(summary, config, scans), meso(summary, config), micro(summary, config)]
+    parts += [quality(summary), struts(summary)]
+    lines = []
+    for part in filter(None, parts):
+        lines += [part.format_map(cite), ""]
+    for reference in cite.listed():
+        lines += [f"| {reference}"]
+    return [*lines, ""]
+
+
+def listing(words: list[str], last: str = "and") -> str:
+    """a, b and c."""
+    return f" {last} ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+
+
+def span(values: list[float], form: str) -> str:
+    """From the least to the greatest of the values, or the one that there is."""
+    low, high = (format(value, form) for value in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
+
+
+def images(summary: dict, config: dict, scans: dict) -> str:
+    """What was scanned, and how the images are read."""
+    first, versions = scans["scans"][0], summary["versions"]
+    size = " x ".join(map(str, first["shape"]))
+    factor, geometry = scans["bin"], config["geometry"]
+    binned = f", binned by {factor} to voxels of {summary['voxel_size_um']:g} micrometres"
+    cell = "read from the autocorrelation of the reference, "
+    level = f"which leaves a porosity of {summary['porosity']:.3f}, "
+    return (
+        "Displacement was measured by architecture-driven digital volume correlation {addvc} {addict} "
+        f"with addvc {versions['addvc']} (commit {versions['commit']}), a Snakemake "
+        f"workflow {{snakemake}}. The scans ({len(summary['states']) + 1}, of {size} voxels of "
+        f"{summary['voxel_size_um'] / factor:g} micrometres{binned if factor > 1 else ''}) were "
+        f"blurred by a Gaussian of {config['images']['blur']:g} voxel and evaluated "
+        "between voxels by cubic B-splines {spline}; lengths are in these voxels. The cell size, "
+        f"{cell if geometry['cell_size'] == 'auto' else ''}is {summary['cell_size']:.1f} "
+        "voxels; the threshold between void and solid, "
+        f"{level if geometry['threshold'] == 'auto' else ''}is "
+        f"{summary['threshold']:.1f} grey levels."
+    )
+
+
+def meso(summary: dict, config: dict) -> str:
+    """Meso DVC and its start."""
+    meshes = [m for name, m in summary["meshes"].items() if not name.startswith("micro")]
+    edges = listing([f"{mesh['mean_edge']:.1f}" for mesh in meshes])
+    starts = listing([STARTS[c] for c in config["meso"]["candidates"]], "or")
+    return (
+        "Each loading state was registered with the reference by finite-element DVC {dvc} on "
+        f"tetrahedra with a mean edge of {edges} voxels, coarse to fine, from the start of least "
+        f"residual: {starts}, each rescaled in a reduced basis {{addvc}}."
+    )
+
+
+def micro(summary: dict, config: dict) -> str:
+    """The mesh of the struts and each method of micro DVC."""
+    mesh = summary["meshes"]["micro"]
+    by = " by isosurface stuffing {stuffing}"
+    lattice = config["mesh"]["backend"] != "pytetwild"
+    text = (
+        f"The struts were meshed{by if lattice else ''} with {mesh['cells']} tetrahedra "
+        f"({mesh['nodes']} nodes, mean volume {mesh['mean_volume']:.3g} voxel^3)."
+    )
+    section = config["micro"]
+    options = micro_options(section, summary["cell_size"], loading_axis(config))
+    along = style.AXES[loading_axis(config)]
+    wave = f"in weights set on a shear wave of period {options.period:g} voxels along {along}"
+    for name, method in micro_names(config).items():
+        lead = " The displacement of its nodes minimises" if name == "micro" else " For comparison:"
+        text += f"{lead} {functional(method, section, options)}, {wave} ({method})."
+    first = section["methods"][0]
+    if section["mending"] and first != "eq10":
+        text += (
+            " Struts whose residual stayed too large were carried by their neighbours and registered "
+            f"again, at most {section['mending']} times."
+        )
+    return text + (
+        f" A loop ended when the rms of an increment fell below {section['tolerance']:g} voxel, "
+        f"{endings(summary, first)}."
+    )
+
+
+def functional(method: str, section: dict, options) -> str:
+    """What a method of micro DVC minimises."""
+    if method == "eq10":
+        return (
+            "the squared residual in the struts, regularised by the equilibrium gap {gap} below "
+            f"{options.l_k:.3g} voxels, and by a Laplacian below {options.l_l:.3g} voxels on penalised "
+            f"faces (Poisson's ratio {options.nu:g})"
+        )
+    shell = section["shell"] and method != "without_shell"
+    robust = section["robust"] != "none" and method != "without_robust"
+    turns = section["rotated"] and method != "without_rotation"
+    return (
+        f"the {'robust residual (Geman-McClure weights {robust})' if robust else 'squared residual'} "
+        f"in the struts{f' and in the void within {shell:g} voxel of them' if shell else ''}, "
+        f"regularised below {options.l_e:.3g} voxels by an elastic energy (Poisson's ratio "
+        f"{options.nu:g}){' in a frame that turns with the struts' if turns else ''}"
+    )
+
+
+def endings(summary: dict, method: str) -> str:
+    """In which states the loop of the default method ended."""
+    lost = [state["label"] for state in summary["states"] if not state["micro"]["converged"]]
+    if lost:
+        return f"which that of {method} did not at {listing(lost)}"
+    return f"as that of {method} did in every state"
+
+
+def quality(summary: dict) -> str:
+    """Residual, ultimate error, validity, and the error where a truth is known."""
+    found = [state["micro"] for state in summary["states"]]
+    residuals = [one["residual_std"] for one in found if one["residual_std"] is not None]
+    if not residuals:
+        return ""
+    ultimate = summary["meshes"]["micro"]["ultimate_error"]
+    valid = span([100 * one["valid_nodes"] for one in found], ".1f")
+    text = (
+        f"The residual has a standard deviation of {span(residuals, '.2f')} grey levels; the error "
+        f"under a rigid sub-voxel shift {{limits}} is {ultimate:.1e} voxel. {valid} % of the nodes "
+        "have a residual that the noise of the images explains; the others are flagged."
+    )
+    errors = [one["error"]["median"] for one in found if one["error"]]
+    known = f" Against the known truth the median error is {span(errors or [0], '.3f')} voxel."
+    return text + (known if errors else "")
+
+
+def struts(summary: dict) -> str:
+    """How struts and cells were analysed, and what came out."""
+    found = [s["struts"] for s in summary["states"] if (s["struts"] or {}).get("bending_share")]
+    if not found:
+        return ""
+    text = (
+        "The motion of each strut was fitted by that of a geometrically exact beam; the energy of the "
+        f"{span([one['valid'] for one in found], 'd')} valid struts is in bending {{bending}} by "
+        f"{span([100 * one['bending_share'] for one in found], '.0f')} %."
+    )
+    if any(state.get("cells") for state in summary["states"]):
+        text += (
+            " The strain of a cell is that of the affine displacement that fits the solid in a window "
+            "one cell wide best {gradient}."
+        )
+    return text
