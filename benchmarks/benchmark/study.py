@@ -22,8 +22,8 @@ RESULTS = {"meso12": "meso 12", "freeform": "free-form", "micro-eq10": "micro, E
            "micro": "micro, corotational"}  # fmt: skip
 """What is compared of a case of the workflow, with its name in tables."""
 
-MESO = ("smooth", "freeform", "freeform_on", "start", "rescale", "best_start", "meso_dvc")
-MICRO = (*MESO, "transfer", "micro_start")
+MESO = ("smooth", "freeform", "start", "best_start", "meso_dvc")
+MICRO = (*MESO, "transfer", "field_on_micro", "micro_start")
 RULES = {
     "meso12": MESO,
     "freeform": ("smooth", "freeform"),
