@@ -70,7 +70,8 @@ def maps(fig: Figure, case: Case, grids: dict, figures: dict, way: tuple[int, in
         band_line(ax, figures[state], (flat, axis, normal), lines)
         ax.set(xlabel=f"{style.AXES[flat]} (voxels)\n{band_words(figures[state])}")
         ax.set(ylabel=f"{style.AXES[axis]} (voxels), loading" if number % width == 0 else "")
-        style.headline(ax, case.title(state, case.micro[0]).replace(": ", ":\n"), number)
+        title = case.title(state, case.micro[0]).replace(": ", ":\n").replace(", ", ",\n")
+        style.headline(ax, title, number)
     label = "strain along the axis\nover its mean (–)"
     style.colour_bar(fig, list(axes), RANGE, style.MAGNITUDE, label, shrink=0.8)
 
