@@ -36,6 +36,9 @@ def folder(tmp_path, cube):
     write_json(tmp_path / "geometry/meso9.json", {"nodes": 1, "cells": 1, "mean_edge": 9.0})
     write_vtu(tmp_path / "geometry/meso9.vtu", cube.points, cube.cells)
     save_volume(tmp_path / "volumes/smooth0.h5", rng.random((9, 11, 13)), 20.0)
+    for state, flagged in ((1, 5), (2, 0)):
+        foam = {"micro": {"valid": 7, "flagged": flagged, "bending_share": None}}
+        write_json(tmp_path / f"struts_state{state}.json", {"foam": foam})
     for name in ("meso9", "micro"):
         for state in (1, 2):
             result = Solution(0.01 * state * cube.points, [0.1, 1e-2 / 100**state], state == 1,
@@ -68,7 +71,8 @@ def test_a_file_the_rule_does_not_declare_is_not_read(folder):
 
 
 def test_titles_tell_of_loops_that_did_not_end_and_of_lost_struts(case):
-    assert case.title(1, "meso9") == "3.4 %"
+    assert case.title(1, "meso9") == "3.4 %: converged"
+    assert case.title(1, "micro") == "3.4 %: converged, 5 struts flagged"
     assert case.title(2, "meso9") == "5.2 %: not converged"
     assert case.title(2, "micro") == "5.2 %: failed"
     assert case.shown_state() == 1
@@ -77,6 +81,22 @@ def test_titles_tell_of_loops_that_did_not_end_and_of_lost_struts(case):
 def test_labels_survive_keys_that_are_words(folder):
     description = DESCRIPTION | {"labels": {"2": "b", "1": "a"}, "root": folder}
     assert Case.of(description).states == [1, 2]
+
+
+def test_a_result_without_flags_is_converged_and_failures_are_red(case, folder):
+    write_json(folder / "struts_state1.json", {"foam": {"micro": {"flagged": 0}}})
+    assert case.verdict("micro", 1) == "converged"
+    fig = style.figure(30)
+    good, bad = fig.subplots(1, 2)
+    style.headline(good, case.title(1, "micro"), 0)
+    style.headline(bad, "a very long name, " + case.title(2, "meso9"), 1)
+    assert good._left_title.get_text() == "(a) 3.4 %: converged"
+    assert bad._left_title.get_text().endswith("5.2 %:\nnot converged")
+    words = "5.2 %: not converged, 35 struts flagged"
+    assert style.narrow(words) == "5.2 %\nnot converged,\n35 struts\nflagged"
+    assert "\n" not in style.two_lines("a long title of a panel: of something else")
+    assert bad._left_title.get_color() == style.RED != good._left_title.get_color()
+    plt.close(fig)
 
 
 # ------------------------------------------------------------------------------ what is cut

@@ -19,7 +19,7 @@ MAY_IMPORT = {name: {*ORDER[: n + 1], *FREE} for n, name in enumerate(ORDER)}
 MAY_IMPORT["twin"] = {"twin", "images", "fem", "errors"}
 
 NEEDED = {"output", "log", "benchmark", "conda", "threads", "resources", "params", "script"}
-WITHOUT_SCRIPT = {"all", "figures"}
+WITHOUT_SCRIPT = {"all", "figures", "ablation", "sensitivity"}
 
 JUDGES = {
     "analysis/truth.py",
@@ -29,6 +29,7 @@ JUDGES = {
 JUDGING = {
     "truth_error",
     "struts_truth",
+    "uncertainty_truth",
     "cells_truth",
     "difficulty",
     "twin_check",
@@ -164,8 +165,28 @@ def test_every_script_belongs_to_one_rule():
 
 
 def test_rules_without_a_script_only_gather():
-    assert set(RULES) & WITHOUT_SCRIPT == {"figures"}  # `all` is in the Snakefile
-    assert set(RULES["figures"][1]) == {"input"}
+    gathering = WITHOUT_SCRIPT - {"all"}  # which is in the Snakefile
+    assert set(RULES) & WITHOUT_SCRIPT == gathering
+    assert all(set(RULES[name][1]) == {"input"} for name in gathering)
+
+
+def test_a_rule_made_from_another_has_output_log_and_benchmark_of_its_own():
+    made = [
+        (name, body)
+        for path in (WORKFLOW / "rules").glob("*.smk")
+        for name, body in re.findall(
+            r"^ *use rule \w+ as (\w+) with:\n((?:.+\n|\n(?! *(?:rule|use|if|def)\b))+)",
+            path.read_text(),
+            re.M,
+        )
+    ]
+    places = {kind: [re.search(rf"{kind}:\s+f?\"(.+?)\"", body)[1] for _, body in made]
+              for kind in ("log", "benchmark")}  # fmt: skip
+    written = "".join(path.read_text() for path in (WORKFLOW / "rules").glob("*.smk"))
+    assert len(made) == len(re.findall(r"^ *use rule ", written, re.M)) > 0
+    assert all("output:" in body for _, body in made)
+    for found in places.values():
+        assert len(set(found)) == len(found)
 
 
 @pytest.mark.parametrize("name", MAKING)

@@ -30,6 +30,9 @@ from addvc.analysis.strut_table import (
 )
 from addvc.analysis.struts import Strut, partition
 from addvc.analysis.struts_truth import BEAMS, FIELD, flags, judged, unloaded
+from addvc.correlation.gauss_newton import Solution
+from addvc.correlation.store import save_solution
+from addvc.fem.io import write_vtu
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.skeleton import FREE_END, Branch, kinks, simplified, strut_graph
 from addvc.images.files import write_json
@@ -575,11 +578,17 @@ def test_figures_against_the_truth_become_rows_with_units(tmp_path):
     for state in (1, 2):
         write_json(tmp_path / f"analysis/struts_truth_state{state}.json",
                    judged(table, true, {"micro": "", "meso9": ""}) | {"flags": FLAGS})  # fmt: skip
+        result = Solution(np.zeros((4, 3)), [1e-4], state == 1, residual={})
+        save_solution(tmp_path / f"dvc/micro_state{state}.h5", result)
+        write_vtu(tmp_path / f"fields/micro_state{state}.vtu", np.eye(4, 3), np.arange(4)[None],
+                  {"valid": np.ones(4)})  # fmt: skip
+        write_json(tmp_path / f"struts_state{state}.json", {"foam": {"micro": {"flagged": 3}}})
     labels = {1: "3.4 %", 2: "5.2 %"}
     case = Case.of({"root": tmp_path, "labels": labels, "meso": ["meso9"], "micro": ["micro"]})
     rows = truth_rows(case)
     assert {len(row) for row in rows} == {6}
-    assert rows[0][4:] == ["3.4 %", "5.2 %"]
+    verdicts = ["converged, 3 struts flagged", "not converged, 3 struts flagged"]
+    assert rows[0][4:] == [f"3.4 %: {verdicts[0]}", f"5.2 %: {verdicts[1]}"]
     found = next(row for row in rows if row[2] == "correlation of the share of bending")
     assert found[4:] == ["1", "1"]
     assert next(row for row in rows if row[2] == "of these, flagged")[4:] == ["1", "1"]

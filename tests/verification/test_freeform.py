@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from addvc.correlation.clear import clear_points
 from addvc.correlation.freeform import (
     LEVELS,
     FreeformOptions,
@@ -16,7 +17,6 @@ from addvc.correlation.freeform import (
 from addvc.correlation.gauss_newton import rms
 from addvc.correlation.spline_grid import evaluate, grid_over
 from addvc.correlation.spline_metric import (
-    clear_points,
     hessian,
     linearise,
     right_hand_side,

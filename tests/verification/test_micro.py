@@ -151,6 +151,16 @@ def test_a_strut_that_went_astray_is_mended(problem):
     assert [row["stage"] for row in rows][1:3] == ["carried", "carried"]
 
 
+def test_no_stage_of_mending_is_longer_than_the_last_may_be(problem):
+    forth, back = turned_by(20)
+    points = problem.reference.mesh.points
+    start = off_course(points, forth(points))
+    plan = [Stage(True, 15.0, Stop(1e-9, 3)), Stage(True, 15.0, Stop(1e-10, 3))]
+    _, rows = corotational(problem, image(back, 31), start, plan, Mending(1, 4.0))
+    assert [row["stage"] for row in rows[1:5]] == ["carried", "carried", "wide", "narrow"]
+    assert [row["iterations"] for row in rows] == [3] * 6
+
+
 def test_nothing_is_mended_where_nothing_is_in_doubt(problem, still):
     start = np.zeros_like(problem.reference.mesh.points)
     solution, rows = corotational(problem, still, start, [Stage(True, 15.0, LAST)], Mending(3, 4.0))

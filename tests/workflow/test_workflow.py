@@ -150,6 +150,7 @@ def test_fields_open_in_other_programs(results, summary, mesh, state):
     assert field.point_data["displacement"].shape == (nodes, 3)
     assert np.isfinite(field.point_data["displacement"]).all()
     assert set(np.unique(field.point_data["valid"])) <= {0, 1}
+    assert ("uncertainty" in field.point_data) == (mesh == "micro")
     valid = summary["states"][state - 1][mesh]["valid_nodes"]
     assert field.point_data["valid"].mean() == pytest.approx(valid)
     strain = field.cell_data["strain"][0].reshape(-1, 3, 3)

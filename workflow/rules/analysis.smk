@@ -34,6 +34,7 @@ rule field:
         solutions=of_state("dvc/{mesh}_state{state}.h5", RESULTS),
         residuals=of_state("analysis/residual_{mesh}_state{state}.h5", RESULTS),
         threshold=f"{R}/geometry/threshold.json",
+        uncertainty=f"{R}/analysis/uncertainty.h5",
     output:
         of_state("fields/{mesh}_state{state}.vtu", RESULTS),
     log:
@@ -48,8 +49,37 @@ rule field:
         runtime=10,
     params:
         code=code("analysis/field.py"),
+        names=RESULTS,
+        uncertain=MICRO[0],
     script:
         "../scripts/analysis/field.py"
+
+
+rule warp:
+    input:
+        mesh=f"{R}/geometry/micro.vtu",
+        region=f"{R}/geometry/region.json",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+        fields=on_micro([FINEST, *MICRO]),
+    output:
+        f"{R}/analysis/warp_state{{state}}.json",
+    log:
+        f"{R}/logs/warp/state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/warp/state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1200, 15.0),
+        runtime=30,
+    params:
+        code=code("analysis/warp.py"),
+        names=[FINEST, *MICRO],
+    script:
+        "../scripts/analysis/warp.py"
 
 
 if HAS_TRUTH:
@@ -75,6 +105,29 @@ if HAS_TRUTH:
             code=code("analysis/truth_error.py"),
         script:
             "../scripts/analysis/truth_error.py"
+
+    rule uncertainty_truth:
+        input:
+            mesh=f"{R}/geometry/micro.vtu",
+            field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
+            uncertainty=f"{R}/analysis/uncertainty.h5",
+            truth=TRUTH,
+        output:
+            f"{R}/analysis/uncertainty_truth_state{{state}}.json",
+        log:
+            f"{R}/logs/uncertainty_truth/state{{state}}.log",
+        benchmark:
+            f"{R}/benchmarks/uncertainty_truth/state{{state}}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1200, 10.0),
+            runtime=10,
+        params:
+            code=code("analysis/uncertainty_truth.py"),
+        script:
+            "../scripts/analysis/uncertainty_truth.py"
 
     rule struts_truth:
         input:
@@ -208,6 +261,33 @@ rule strut_partition:
         "../scripts/analysis/strut_partition.py"
 
 
+rule topology:
+    input:
+        solid=f"{R}/geometry/solid.h5",
+        threshold=f"{R}/geometry/threshold.json",
+        mesh=f"{R}/geometry/micro.vtu",
+        struts=f"{R}/geometry/struts.h5",
+        starts=expand(f"{R}/dvc/micro_start_state{{state}}.h5", state=STATES),
+        solutions=expand(f"{R}/dvc/{MICRO[0]}_state{{state}}.h5", state=STATES),
+    output:
+        f"{R}/geometry/topology.json",
+    log:
+        f"{R}/logs/topology/all.log",
+    benchmark:
+        f"{R}/benchmarks/topology/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 15.0),
+        runtime=60,
+    params:
+        code=code("analysis/topology.py"),
+        states=STATES,
+    script:
+        "../scripts/analysis/topology.py"
+
+
 rule noise_draws:
     input:
         mesh=f"{R}/geometry/micro.vtu",
@@ -235,6 +315,29 @@ rule noise_draws:
         "../scripts/analysis/noise_draws.py"
 
 
+rule uncertainty:
+    input:
+        noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
+        struts=f"{R}/geometry/struts.h5",
+    output:
+        arrays=f"{R}/analysis/uncertainty.h5",
+        figures=f"{R}/analysis/uncertainty.json",
+    log:
+        f"{R}/logs/uncertainty/all.log",
+    benchmark:
+        f"{R}/benchmarks/uncertainty/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 6.0),
+        runtime=10,
+    params:
+        code=code("analysis/uncertainty.py"),
+    script:
+        "../scripts/analysis/uncertainty.py"
+
+
 rule struts:
     input:
         noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
@@ -257,6 +360,8 @@ rule struts:
     params:
         code=code("analysis/struts.py"),
         nu=config["micro"]["nu"],
+        micro=section("micro", "rotated"),
+        method=METHODS[MICRO[0]],
         names=[MICRO[0], FINEST],
     script:
         "../scripts/analysis/struts.py"
@@ -293,6 +398,7 @@ rule summary:
         f"{R}/geometry/cell_size.json",
         f"{R}/geometry/threshold.json",
         expand(f"{R}/geometry/{{mesh}}.json", mesh=[*MESO, "micro"]),
+        f"{R}/geometry/topology.json",
         expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
         expand(
             f"{R}/dvc/{{name}}_state{{state}}.h5",
@@ -320,8 +426,11 @@ rule summary:
         if HAS_TRUTH
         else [],
         expand(
-            f"{R}/{{name}}_state{{state}}.json", name=["struts", "cells"], state=STATES
+            f"{R}/{{name}}_state{{state}}.json",
+            name=["struts", "cells", "analysis/warp"],
+            state=STATES,
         ),
+        f"{R}/analysis/uncertainty.json",
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",

@@ -9,6 +9,7 @@ WORKFLOW = Path(str(workflow.current_basedir)).parent
 sys.path.insert(0, str(WORKFLOW / "src"))
 
 from addvc import config as settings
+from addvc import studies
 from addvc.errors import ConfigError
 from addvc.provenance import code_hash
 
@@ -52,6 +53,7 @@ FINEST = MESO[-1]
 METHODS = settings.micro_names(config)
 MICRO = list(METHODS)
 RESULTS = [*MESO, *MICRO]  # all that is measured on, coarse to fine
+EARLIER = ["previous", "extrapolated", "composed"]  # starts that need the state before
 FREEFORM = ["freeform"] if "freeform" in config["meso"]["candidates"] else []
 JUDGED = [*MESO, *FREEFORM, *MICRO]  # all that a truth, where known, is compared with
 TRUTH = settings.truth_file(config) if KIND == "scans" else None
@@ -73,8 +75,8 @@ wildcard_constraints:
     mesh="|".join(MESO + MICRO),
     meso="|".join(MESO),
     micro="|".join(MICRO),
-    candidate="zero|platens|freeform",
-    target=f"micro|{MESO[0]}",
+    candidate="zero|platens",
+    field="|".join(["freeform", *EARLIER]),
 
 
 def code(script):
@@ -111,18 +113,45 @@ def scan_input(state):
     return [scan_path(state)] if own_scan(state) else SCAN_FILES[state]
 
 
+def fields_of(wildcards):
+    """Candidates of a state that are defined everywhere, so that any mesh may start from them."""
+    later = EARLIER if int(wildcards.state) > 1 else []
+    return [
+        name for name in config["meso"]["candidates"] if name in ["freeform", *later]
+    ]
+
+
+def field_files(wildcards):
+    """What these candidates are made from (`addvc.correlation.candidates`)."""
+    names, before = fields_of(wildcards), int(wildcards.state) - 1
+    files = {}
+    if "freeform" in names:
+        files["freeform"] = f"{R}/dvc/freeform_state{wildcards.state}.h5"
+    if set(names) & set(EARLIER):
+        files["previous"] = f"{R}/dvc/{FINEST}_state{before}.h5"
+        files["finest"] = f"{R}/geometry/{FINEST}.vtu"
+        files["deformed_before"] = f"{R}/volumes/smooth{before}.h5"
+    if "composed" in names:
+        files["step"] = f"{R}/dvc/step_state{wildcards.state}.h5"
+    return files
+
+
+def pyramid_files(wildcards):
+    """The starts by the pyramid, and the grid that one of them is on."""
+    files = {
+        name: f"{R}/dvc/start-{name}_state{wildcards.state}.h5"
+        for name in config["meso"]["candidates"]
+        if name in ["zero", "platens"]
+    }
+    if "platens" in files:
+        files |= {"grid": f"{R}/geometry/grid.vtu", "lines": f"{R}/geometry/grid.json"}
+    return files
+
+
 def mesh_of_candidate(wildcards):
     """`zero` starts on the coarsest mesh, `platens` on the grid."""
     name = "grid" if wildcards.candidate == "platens" else MESO[0]
     return f"{R}/geometry/{name}.vtu"
-
-
-def candidate_start(wildcards):
-    """What is rescaled: the free-form displacement is on the coarsest mesh already."""
-    name = f"start-{wildcards.candidate}"
-    if wildcards.candidate == "freeform":
-        name = f"freeform_on_{MESO[0]}"
-    return f"{R}/dvc/{name}_state{wildcards.state}.h5"
 
 
 def coarser(wildcards):
@@ -146,6 +175,12 @@ def on_micro(names):
     """The displacements of results at the nodes of the micro mesh, in one state."""
     parts = [name if name in MICRO else f"{name}_on_micro" for name in names]
     return of_state("dvc/{mesh}_state{state}.h5", parts)
+
+
+def starts_on_micro(wildcards):
+    """The candidate starts of micro DVC at its nodes."""
+    names = [FINEST, *fields_of(wildcards)]
+    return [f"{R}/dvc/{name}_on_micro_state{wildcards.state}.h5" for name in names]
 
 
 def mesh_of(name):

@@ -40,8 +40,12 @@ def residuals(*names):
 
 
 def fields(*names):
-    """Fields with the validity of each node, in every state."""
-    return expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES)
+    """Fields with the validity of each node, in every state; of `micro` that of the struts too."""
+    struts = f"{R}/struts_state{{state}}.json" if MICRO[0] in names else []
+    return [
+        *expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=names, state=STATES),
+        *expand(struts, state=STATES),
+    ]
 
 
 def struts():
@@ -57,6 +61,12 @@ def struts():
 def struts_truth(suffix):
     """Struts against the truth, where there is one."""
     name = f"{R}/analysis/struts_truth_state{{state}}.{suffix}"
+    return expand(name, state=STATES) if HAS_TRUTH else []
+
+
+def uncertainty_truth():
+    """Errors against their uncertainty, where there is a truth."""
+    name = f"{R}/analysis/uncertainty_truth_state{{state}}.json"
     return expand(name, state=STATES) if HAS_TRUTH else []
 
 

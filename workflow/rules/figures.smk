@@ -170,6 +170,66 @@ rule fig09:
         "../scripts/figures/fig09.py"
 
 
+rule fig14:
+    input:
+        SPECIMEN,
+        smooth(0),
+        f"{R}/geometry/cell_size.json",
+        f"{R}/geometry/micro.vtu",
+    output:
+        shown(
+            "fig14_local_region.png",
+            "fig14",
+            "Microscale DVC",
+            "slab of Fig. 15 to 17",
+        ),
+    log:
+        f"{R}/logs/figures/fig14.log",
+    benchmark:
+        f"{R}/benchmarks/figures/fig14.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 15.0),
+        runtime=15,
+    params:
+        code=code("figures/fig14.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/fig14.py"
+
+
+rule more_topology:
+    input:
+        SPECIMEN,
+        smooth(0),
+        meshes("micro"),
+        f"{R}/geometry/topology.json",
+    output:
+        table=shown(
+            "more_topology.csv", "more_topology", "Tables", "stubs, necks and welds"
+        ),
+        picture=shown(
+            "more_topology.png", "more_topology", "Meshes", "stubs, necks and welds"
+        ),
+    log:
+        f"{R}/logs/figures/more_topology.log",
+    benchmark:
+        f"{R}/benchmarks/figures/more_topology.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(2000, 15.0),
+        runtime=10,
+    params:
+        code=code("figures/more_topology.py"),
+        case=FIGURE_CASE,
+    script:
+        "../scripts/figures/more_topology.py"
+
+
 rule table1:
     input:
         SPECIMEN,
@@ -203,6 +263,7 @@ rule table2:
         f"{R}/geometry/cell_size.json",
         meshes(*MESO, "micro"),
         solutions(*MESO, *MICRO),
+        fields(*MICRO),
         expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
     output:
         shown("table2_parameters.csv", "table2", "Tables", "parameters"),
@@ -390,6 +451,7 @@ if STATES:
         input:
             CARRIED,
             smooth(0, *STATES),
+            expand(f"{R}/analysis/warp_state{{state}}.json", state=STATES),
         output:
             shown(
                 "fig16_warp.png",
@@ -483,6 +545,36 @@ if STATES:
         script:
             "../scripts/figures/more_bending.py"
 
+    rule more_uncertainty:
+        input:
+            SPECIMEN,
+            smooth(0),
+            meshes("micro"),
+            solutions(MICRO[0]),
+            fields(MICRO[0]),
+            f"{R}/geometry/struts.h5",
+            f"{R}/analysis/uncertainty.h5",
+            f"{R}/analysis/uncertainty.json",
+            uncertainty_truth(),
+        output:
+            shown("more_uncertainty.png", "more_uncertainty", "Quality", "uncertainty"),
+        log:
+            f"{R}/logs/figures/more_uncertainty.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_uncertainty.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(2000, 6.0),
+            runtime=15,
+        params:
+            code=code("figures/more_uncertainty.py"),
+            case=FIGURE_CASE,
+            truth=HAS_TRUTH,
+        script:
+            "../scripts/figures/more_uncertainty.py"
+
     rule more_localisation:
         input:
             SPECIMEN,
@@ -518,6 +610,7 @@ if STATES:
     rule more_convergence:
         input:
             solutions(*MESO, *MICRO),
+            fields(*MICRO),
         output:
             shown("more_convergence.png", "more_convergence", "Quality", "convergence"),
             drawing("more_convergence"),
@@ -543,9 +636,11 @@ if STATES:
 
     rule more_starts:
         input:
+            solutions(MICRO[0]),
+            fields(MICRO[0]),
             expand(
                 f"{R}/dvc/{{name}}_state{{state}}.h5",
-                name=["start", "micro_start"],
+                name=["start", *MESO[1:], "micro_start"],
                 state=STATES,
             ),
         output:
@@ -565,6 +660,29 @@ if STATES:
             case=FIGURE_CASE,
         script:
             "../scripts/figures/more_starts.py"
+
+    rule more_warp:
+        input:
+            solutions(FINEST, *MICRO),
+            fields(*MICRO),
+            expand(f"{R}/analysis/warp_state{{state}}.json", state=STATES),
+        output:
+            shown("more_warp.csv", "more_warp", "Tables", "overlap with the image"),
+        log:
+            f"{R}/logs/figures/more_warp.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_warp.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=5,
+        params:
+            code=code("figures/more_warp.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_warp.py"
 
 
 if STATES and HAS_TRUTH:

@@ -101,6 +101,7 @@ rule micro_mesh:
         solid=f"{R}/geometry/solid.h5",
         surface=f"{R}/geometry/surface.vtu",
         threshold=f"{R}/geometry/threshold.json",
+        region=f"{R}/geometry/region.json",
     output:
         mesh=f"{R}/geometry/micro_mesh.vtu",
         figures=f"{R}/geometry/micro.json",

@@ -55,62 +55,25 @@ rule freeform:
         "../scripts/meso/freeform.py"
 
 
-rule freeform_on:
+use rule freeform as freeform_step with:
     input:
-        mesh=f"{R}/geometry/{{target}}.vtu",
-        solution=f"{R}/dvc/freeform_state{{state}}.h5",
-    output:
-        f"{R}/dvc/freeform_on_{{target}}_state{{state}}.h5",
-    log:
-        f"{R}/logs/freeform_on/{{target}}_state{{state}}.log",
-    benchmark:
-        f"{R}/benchmarks/freeform_on/{{target}}_state{{state}}.tsv"
-    conda:
-        ENV
-    threads: 1
-    resources:
-        mem_mb=memory(600, 10.0),
-        runtime=10,
-    params:
-        code=code("meso/freeform_on.py"),
-    script:
-        "../scripts/meso/freeform_on.py"
-
-
-rule rescale:
-    input:
-        reference=f"{R}/volumes/smooth0.h5",
+        reference=lambda wildcards: f"{R}/volumes/smooth{int(wildcards.state) - 1}.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
-        start=candidate_start,
-        grid=f"{R}/geometry/grid.vtu",
-        lines=f"{R}/geometry/grid.json",
-        mesh=f"{R}/geometry/{MESO[0]}.vtu",
+        cell_size=f"{R}/geometry/cell_size.json",
     output:
-        f"{R}/dvc/rescaled-{{candidate}}_state{{state}}.h5",
+        f"{R}/dvc/step_state{{state}}.h5",
     log:
-        f"{R}/logs/rescale/{{candidate}}_state{{state}}.log",
+        f"{R}/logs/freeform_step/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/rescale/{{candidate}}_state{{state}}.tsv"
-    conda:
-        ENV
-    threads: 1
-    resources:
-        mem_mb=memory(1500, 30.0),
-        runtime=10,
-    params:
-        code=code("meso/rescale.py"),
-    script:
-        "../scripts/meso/rescale.py"
+        f"{R}/benchmarks/freeform_step/state{{state}}.tsv"
 
 
 rule best_start:
     input:
+        unpack(field_files),
+        unpack(pyramid_files),
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
-        candidates=expand(
-            f"{R}/dvc/rescaled-{{candidate}}_state{{{{state}}}}.h5",
-            candidate=config["meso"]["candidates"],
-        ),
         mesh=f"{R}/geometry/{MESO[0]}.vtu",
         figures=f"{R}/geometry/{MESO[0]}.json",
     output:
@@ -124,11 +87,12 @@ rule best_start:
     threads: 1
     resources:
         mem_mb=memory(1500, 30.0),
-        runtime=10,
+        runtime=20,
     params:
         code=code("meso/best_start.py"),
-        names=config["meso"]["candidates"],
-        meso=section("meso", "l_l", "tolerance", "max_iterations"),
+        candidates=config["meso"]["candidates"],
+        names=fields_of,
+        meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
         axis=AXIS,
     script:
         "../scripts/meso/best_start.py"
@@ -136,6 +100,11 @@ rule best_start:
 
 rule meso_dvc:
     input:
+        unpack(
+            lambda wildcards: (
+                {} if wildcards.meso == MESO[0] else field_files(wildcards)
+            )
+        ),
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
         mesh=f"{R}/geometry/{{meso}}.vtu",
@@ -156,8 +125,14 @@ rule meso_dvc:
         runtime=60,
     params:
         code=code("meso/meso_dvc.py"),
-        meso=section("meso", "l_l", "tolerance", "max_iterations"),
+        meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
         coarsest=lambda wildcards: wildcards.meso == MESO[0],
+        coarser=lambda wildcards: (
+            "start" if wildcards.meso == MESO[0] else coarser(wildcards)
+        ),
+        names=lambda wildcards: (
+            [] if wildcards.meso == MESO[0] else fields_of(wildcards)
+        ),
         axis=AXIS,
     script:
         "../scripts/meso/meso_dvc.py"
@@ -183,7 +158,7 @@ rule meso_ultimate_error:
         runtime=60,
     params:
         code=code("meso/ultimate_error.py"),
-        meso=section("meso", "l_l", "tolerance", "max_iterations"),
+        meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
         coarsest=lambda wildcards: wildcards.meso == MESO[0],
         axis=AXIS,
         ultimate_error=config["ultimate_error"],

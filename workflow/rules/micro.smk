@@ -24,6 +24,31 @@ rule transfer:
         "../scripts/micro/transfer.py"
 
 
+rule field_on_micro:
+    input:
+        unpack(field_files),
+        mesh=f"{R}/geometry/micro.vtu",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=f"{R}/volumes/smooth{{state}}.h5",
+    output:
+        f"{R}/dvc/{{field}}_on_micro_state{{state}}.h5",
+    log:
+        f"{R}/logs/field_on_micro/{{field}}_state{{state}}.log",
+    benchmark:
+        f"{R}/benchmarks/field_on_micro/{{field}}_state{{state}}.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600, 10.0),
+        runtime=10,
+    params:
+        code=code("micro/field_on_micro.py"),
+        axis=AXIS,
+    script:
+        "../scripts/micro/field_on_micro.py"
+
+
 rule micro_start:
     input:
         mesh=f"{R}/geometry/micro.vtu",
@@ -31,7 +56,7 @@ rule micro_start:
         deformed=f"{R}/volumes/smooth{{state}}.h5",
         threshold=f"{R}/geometry/threshold.json",
         cell_size=f"{R}/geometry/cell_size.json",
-        candidates=on_micro([FINEST, *FREEFORM]),
+        candidates=starts_on_micro,
     output:
         f"{R}/dvc/micro_start_state{{state}}.h5",
     log:
@@ -46,7 +71,7 @@ rule micro_start:
         runtime=10,
     params:
         code=code("micro/micro_start.py"),
-        names=[FINEST, *FREEFORM],
+        names=lambda wildcards: [FINEST, *fields_of(wildcards)],
         micro=section(
             "micro",
             "l_k",

@@ -1,7 +1,11 @@
-"""The candidate with the least residual after a short correlation on the coarsest mesh."""
+"""The candidate with the least residual after Eq. 6, 7 and a short correlation on the coarsest mesh."""
 
-from addvc.correlation.meso import best_start, meso_options, meso_system
-from addvc.correlation.store import load_solution, save_solution
+import numpy as np
+
+from addvc.correlation.candidates import candidate
+from addvc.correlation.meso import meso_options, meso_system, scaled_start
+from addvc.correlation.store import load_field, save_solution
+from addvc.correlation.transfer import lattice_matrix
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.scans import load_volume
@@ -9,16 +13,17 @@ from addvc.runtime import job
 
 with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params
+    mesh = read_mesh(source.mesh)
     size = read_json(source.figures)["mean_edge"]
     options = meso_options(params.meso, size, params.axis, coarsest=True)
-    system = meso_system(read_mesh(source.mesh), load_volume(source.reference)[0], options)
-    tried = {
-        name: load_solution(path)
-        for name, path in zip(params.names, source.candidates, strict=True)
-    }
-    starts = {name: solution.u for name, (solution, _) in tried.items()}
-    best, solution, table = best_start(system, load_volume(source.deformed)[0], starts)
-    for row in table:
-        row["factors"] = tried[row["candidate"]][1]["factors"]
+    system = meso_system(mesh, load_volume(source.reference)[0], options)
+    starts = {name: candidate(name, source, params.axis)(mesh.points) for name in params.names}
+    if "zero" in params.candidates:
+        starts["zero"] = load_field(source.zero)
+    if "platens" in params.candidates:
+        lines = [np.array(line) for line in read_json(source.lines)["lines"]]
+        into = lattice_matrix(lines, read_mesh(source.grid), mesh.points)
+        starts["platens"] = into @ load_field(source.platens)
+    best, solution, table = scaled_start(system, load_volume(source.deformed)[0], starts)
     log.info("best start: %s", best)
     save_solution(snakemake.output[0], solution, best=best, candidates=table)

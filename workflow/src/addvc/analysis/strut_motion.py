@@ -94,8 +94,8 @@ def strut_motion(
 ) -> StrutMotion:
     """The motion of a strut whose nodes at points (k, 3) are displaced by u (k, 3).
 
-    draws (d, k, 3): displacements that the noise of the images makes. Noise that moves a whole end
-    leaves no scatter."""
+    draws (d, k, 3): displacements that the noise of the images makes in that state (turned with the
+    strut, where the method is). Noise that moves a whole end leaves no scatter."""
     beam, weight = Beam.of(strut), strut.weight / strut.weight.sum()
     below = np.minimum(strut.place.astype(int), len(beam.chord) - 1)
     at = Places(below, (strut.place - below)[:, None])

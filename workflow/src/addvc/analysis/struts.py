@@ -7,17 +7,14 @@ ball that fits in a junction, the solid is the junction's.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
 from addvc.fem.mesh import Mesh, cell_volumes
+from addvc.geometry.lines import nearest_line, resampled
 from addvc.geometry.skeleton import FREE_END, StrutGraph
 
 STATIONS = 17
 """Sections along a strut at which it is described."""
-
-SPACING = 0.25
-"""Of the points of a branch that nodes are given to, voxels."""
 
 LEAST = 24
 """Nodes of a strut, at least, for its motion to be fitted."""
@@ -78,7 +75,7 @@ def partition(mesh: Mesh, graph: StrutGraph, excess: np.ndarray) -> list[Strut]:
         return []
     volume, centre = np.abs(cell_volumes(mesh)), mesh.points[mesh.cells].mean(axis=1)
     weight = np.bincount(mesh.cells.ravel(), np.repeat(volume / 4, 4), len(mesh.points))
-    lines = [resampled(branch.points, SPACING) for branch in graph.branches]
+    lines = [resampled(branch.points) for branch in graph.branches]
     cells, nodes = (nearest_line(lines, x) for x in (centre, mesh.points))
     struts = []
     for branch, line, own, held in zip(graph.branches, lines, cells, nodes, strict=True):
@@ -94,23 +91,6 @@ def partition(mesh: Mesh, graph: StrutGraph, excess: np.ndarray) -> list[Strut]:
         curve = centre_line(line, bounds, radius, excess)
         struts.append(measured_strut(branch.ends, trims, curve, solid, skin))
     return [strut for strut in struts if len(strut.nodes) >= LEAST]
-
-
-def resampled(points: np.ndarray, spacing: float) -> np.ndarray:
-    """A line (k, 3) of voxels, smoothed over its neighbours, as points of about equal spacing."""
-    smooth = points.copy()
-    smooth[1:-1] = (points[:-2] + 2 * points[1:-1] + points[2:]) / 4
-    s = np.r_[0, np.cumsum(np.linalg.norm(np.diff(smooth, axis=0), axis=1))]
-    at = np.linspace(0, s[-1], max(2, round(s[-1] / spacing) + 1))
-    return np.stack([np.interp(at, s, x) for x in smooth.T], axis=1)
-
-
-def nearest_line(lines: list[np.ndarray], points: np.ndarray) -> list[np.ndarray]:
-    """For each line (k, 3), which of the points (q, 3) are nearest to it."""
-    owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
-    label = owner[cKDTree(np.vstack(lines)).query(points)[1]]
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.searchsorted(label[order], np.arange(1, len(lines))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,8 +48,10 @@ def summarise(
         "threshold": threshold["threshold"],
         "porosity": threshold["porosity"],
         "noise": threshold["noise"],
+        "uncertainty": read("analysis/uncertainty.json"),
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
+        "topology": read("geometry/topology.json")["counts"],
         "states": [
             state_figures(folder, state, label, meshes, finest, axis, truth)
             for state, label in states.items()
@@ -101,6 +103,7 @@ def state_figures(
         "freeform": freeform_figures(folder, state, truth),
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
+        "warp": read_json(folder / f"analysis/warp_state{state}.json"),
         "cells": read_json(folder / f"cells_state{state}.json")["localisation"],
     }
 

@@ -34,6 +34,9 @@ log = logging.getLogger(__name__)
 EARLY = 10
 """Tolerance of a stage that is not the last, over that of the last."""
 
+EARLY_MOST = 10
+"""Iterations of such a stage, at most: its rotations are not the last ones."""
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -42,6 +45,11 @@ class Stage:
     rotated: bool = True
     scale: float | None = None
     stop: Stop = field(default_factory=Stop)
+
+
+def early(last: Stop) -> Stop:
+    """The end of a stage before the last, whose own end is `last`: never more iterations than that."""
+    return Stop(EARLY * last.tolerance, min(EARLY_MOST, last.max_iterations))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +144,7 @@ def mended(
     problem: Problem, deformed: np.ndarray, u: np.ndarray, last: Stage, mending: Mending
 ) -> Iterator[tuple[Solution, dict]]:
     """The stages of the cycles of mending: twice carried, then with all points, wide and narrow."""
-    short = replace(last, stop=Stop(EARLY * last.stop.tolerance, 10))
+    short = replace(last, stop=early(last.stop))
     wide = replace(short, scale=None if last.scale is None else 2 * last.scale)
     for _ in range(mending.cycles):
         doubtful = doubtful_nodes(problem.reference, deformed, u, mending.limit)

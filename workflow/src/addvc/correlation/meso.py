@@ -1,8 +1,9 @@
 """Section 3.2: meso DVC, from a start found over a pyramid of binned images to the finest mesh.
 
 Candidate starts: `zero` (u = 0, then the pyramid on the coarsest tetrahedra), `platens` (the pyramid
-on a hexahedral grid that reaches into the platens) and `freeform` (`correlation.freeform`). Each is
-rescaled on the coarsest mesh by Eq. 6, 7; the best, by sigma(r) after a short correlation, is kept.
+on a hexahedral grid that reaches into the platens) and those of `correlation.candidates`. Each is
+rescaled on the coarsest mesh by Eq. 6, 7. On every mesh the best, by sigma(r) after a short
+correlation, is kept; the finer meshes choose between the coarser solution and `correlation.candidates`.
 """
 
 import logging
@@ -10,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from addvc.correlation.clear import clear_voxels
 from addvc.correlation.gauss_newton import Solution, gauss_newton
 from addvc.correlation.metric import (
     Reference,
@@ -30,17 +32,20 @@ from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to
 
 log = logging.getLogger(__name__)
 
+TRIAL = Stop(1e-3, 10)  # of a candidate start
 START_VOXELS = 2e6  # a start is coarse: more voxels would take memory and give nothing
 
 
 @dataclass(frozen=True)
 class MesoOptions:
-    """Lengths in voxels: cut-off l_L of Eq. 9 (0 for none) and period T of its trial wave."""
+    """Lengths in voxels: cut-off l_L of Eq. 9 (0 for none) and period T of its trial wave; only voxels
+    take part whose gradient exceeds `clear` times the noise (0: all)."""
 
     axis: int
     cutoff: float
     period: float
     stop: Stop = field(default_factory=Stop)
+    clear: float = 0.0
 
 
 def meso_options(section: dict, size: float, axis: int, coarsest: bool) -> MesoOptions:
@@ -51,7 +56,7 @@ def meso_options(section: dict, size: float, axis: int, coarsest: bool) -> MesoO
     0.6 of the edge keeps the system regular and falls from mesh to mesh."""
     cutoff = 0.6 * size if section["l_l"] == "auto" else float(section["l_l"])
     stop = Stop(section["tolerance"], section["max_iterations"])
-    return MesoOptions(axis, 0.0 if coarsest else cutoff, 4 * size, stop)
+    return MesoOptions(axis, 0.0 if coarsest else cutoff, 4 * size, stop, section["clear"])
 
 
 def start_options(section: dict, size: float, axis: int) -> MesoOptions:
@@ -60,15 +65,16 @@ def start_options(section: dict, size: float, axis: int) -> MesoOptions:
 
 
 def meso_quadrature(
-    mesh: Mesh, shape: tuple[int, int, int], lines: list | None = None, most: float = np.inf
+    mesh: Mesh, coefficients: np.ndarray, clear: float, most: float = np.inf
 ) -> Quadrature:
-    """Voxel centres inside tetrahedra, or inside a grid given by its grid lines.
+    """Voxel centres inside tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
+    chosen = clear_voxels(coefficients, 1, clear) if clear > 0 else None
+    return voxel_points(mesh, coefficients.shape, thinning(coefficients.size, most), chosen)
 
-    One voxel in stride**3 where the image has more than `most`."""
-    stride = max(1, int(np.ceil((np.prod(shape) / most) ** (1 / 3))))
-    if lines is None:
-        return voxel_points(mesh, shape, stride)
-    return lattice_points(lines, shape, stride)
+
+def thinning(voxels: int, most: float) -> int:
+    """The stride that leaves at most some `most` of so many voxels."""
+    return max(1, int(np.ceil((voxels / most) ** (1 / 3))))
 
 
 def meso_system(
@@ -78,19 +84,20 @@ def meso_system(
     lines: list | None = None,
     most: float = np.inf,
 ) -> System:
-    """Eq. 9 with T = L on one mesh: I_r sampled at voxel centres, and A = H + M factorised."""
-    quadrature = meso_quadrature(mesh, coefficients.shape, lines, most)
+    """Eq. 9 with T = L on one mesh: I_r sampled at voxel centres, and A = H + M factorised.
+
+    `lines` are the grid lines of a hexahedral grid."""
+    if lines is None:
+        quadrature = meso_quadrature(mesh, coefficients, options.clear, most)
+    else:
+        stride = thinning(coefficients.size, most)
+        quadrature = lattice_points(lines, coefficients.shape, stride)
     reference = reference_on(mesh, quadrature, coefficients)
     h = hessian(reference, node_pattern(mesh))
     if options.cutoff == 0:
         return System(reference, None, factorise(h))
     extra = diffusion(mesh, h, options.cutoff, options.period, options.axis)
     return System(reference, extra, factorise(h + extra))
-
-
-def coarse_reference(mesh: Mesh, coefficients: np.ndarray) -> Reference:
-    """I_r at the voxel centres of a tetrahedral mesh."""
-    return reference_on(mesh, meso_quadrature(mesh, coefficients.shape), coefficients)
 
 
 def pyramid_start(
@@ -156,13 +163,26 @@ def rescale(
     return replace(solution, residual=after), factors
 
 
-def best_start(
-    system: System, deformed: np.ndarray, candidates: dict[str, np.ndarray], iterations: int = 10
+def scaled_start(
+    system: System, deformed: np.ndarray, candidates: dict[str, np.ndarray]
 ) -> tuple[str, Solution, list[dict]]:
-    """The candidate with the least sigma(r) after `iterations` on the coarsest mesh, and the table."""
+    """The best of candidates {name: u (n, 3)} on the coarsest mesh, each rescaled first."""
+    tried = {name: rescale(system.reference, deformed, u, TRIAL) for name, u in candidates.items()}
+    starts = {name: solution.u for name, (solution, _) in tried.items()}
+    best, solution, table = best_start(system, deformed, starts, TRIAL)
+    return best, solution, [row | {"factors": tried[row["candidate"]][1]} for row in table]
+
+
+def best_start(
+    system: System,
+    deformed: np.ndarray,
+    candidates: dict[str, np.ndarray],
+    stop: Stop,
+) -> tuple[str, Solution, list[dict]]:
+    """The candidate with the least sigma(r) after a few iterations on a mesh, and the table."""
     table, tried = [], {}
     for name, u in candidates.items():
-        solution = register(system, deformed, u, Stop(1e-3, iterations), f"start {name}")
+        solution = register(system, deformed, u, stop, f"start {name}")
         tried[name] = solution
         table.append(
             {
@@ -180,3 +200,19 @@ def best_start(
 
     best = min(table, key=rank)["candidate"]
     return best, tried[best], table
+
+
+def chosen_register(
+    system: System, deformed: np.ndarray, candidates: dict[str, np.ndarray], stop: Stop, name: str
+) -> tuple[Solution, str, list[dict]]:
+    """Eq. 9 on a mesh from the best of its candidates {name: u (n, 3)}; the best, and the table.
+
+    The iterations that chose it count."""
+    few = min(10, stop.max_iterations)
+    best, tried, table = best_start(system, deformed, candidates, Stop(stop.tolerance, few))
+    if tried.converged or few == stop.max_iterations:
+        return tried, best, table
+    rest = Stop(stop.tolerance, stop.max_iterations - few)
+    solution = register(system, deformed, tried.u, rest, name)
+    history, seconds = tried.history + solution.history, tried.seconds + solution.seconds
+    return replace(solution, history=history, seconds=seconds), best, table

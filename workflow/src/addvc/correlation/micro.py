@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from addvc.correlation.corotational import EARLY, Mending, Stage
+from addvc.correlation.corotational import Mending, Stage, early
 from addvc.correlation.doubt import residual_limit
 from addvc.correlation.metric import Reference, hessian, reference_on
 from addvc.correlation.register import Stop
@@ -43,11 +43,13 @@ def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
     sizes give median errors of .13 / .10 / .09 voxel at 3.4 %. Where a cell has many voxels
     (trabecular bone: 84) the noise, not the cell, asks for smoothing, and less of it: 20 / 56 / 168
     voxels gave .06 / .10 / .22 voxel on a wavy field. "auto" of l_E: 0.8 cell size, at most 0.7
-    periods."""
+    periods. `times`, where given: factors on some of them (`addvc.studies`)."""
     longest = min(2 * cell_size, 1.6 * section["period"])
     auto = {"l_k": longest, "l_l": longest, "l_e": min(0.8 * cell_size, 0.7 * section["period"])}
+    times = section.get("times", {})
     lengths = {
-        key: value if section[key] == "auto" else float(section[key]) for key, value in auto.items()
+        key: times.get(key, 1.0) * (value if section[key] == "auto" else float(section[key]))
+        for key, value in auto.items()
     }
     return MicroOptions(axis=axis, **lengths, period=float(section["period"]), nu=section["nu"])
 
@@ -106,15 +108,18 @@ def robust_scale(setting: str | float, levels: dict) -> float | None:
     return float(setting)
 
 
+def turns(section: dict, method: str) -> bool:
+    """Whether the frame of a method turns with the struts; `section`: `micro` of a configuration."""
+    return bool(section["rotated"]) and method not in ("eq10", "without_rotation")
+
+
 def stages(section: dict, levels: dict, method: str = "corotational") -> list[Stage]:
     """Stages of micro DVC from the `micro` section of a configuration and the grey `levels` of the
-    threshold (void, solid, noise); all but the last end at ten times the tolerance or after ten
-    iterations: their rotations are not the last ones."""
-    rotated = section["rotated"] and method != "without_rotation"
+    threshold (void, solid, noise); all but the last end early (`correlation.corotational.early`)."""
+    rotated = turns(section, method)
     scale = None if method == "without_robust" else robust_scale(section["robust"], levels)
     last = Stop(section["tolerance"], section["max_iterations"])
-    early = Stop(EARLY * last.tolerance, min(10, last.max_iterations))
-    ends = [early] * (section["stages"] - 1) + [last]
+    ends = [early(last)] * (section["stages"] - 1) + [last]
     return [Stage(rotated, scale, end) for end in ends]
 
 

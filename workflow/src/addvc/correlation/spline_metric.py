@@ -1,14 +1,15 @@
 """Eq. 2, 3, 5 on a spline grid: which voxels take part, residual, gradient and Hessian of S(u).
 
-Only voxels where the reference has a clear gradient take part: at large strain the void beside a
-strut meets other struts, and pulls the wrong way. The slope is the mean of the gradients of I_r at X
-and of I_d at X + u, which predicts a motion one order better than either.
+Only voxels where the reference has a clear gradient take part (`correlation.clear`). The slope is the
+mean of the gradients of I_r at X and of I_d at X + u, which predicts a motion one order better than
+either.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from addvc.correlation.clear import clear_points
 from addvc.correlation.metric import residual_statistics
 from addvc.correlation.spline_grid import (
     SplineGrid,
@@ -18,13 +19,7 @@ from addvc.correlation.spline_grid import (
     sum_basis,
 )
 from addvc.correlation.spline_stencil import scatter_dyads
-from addvc.errors import CorrelationError
 from addvc.images.spline import spline_value_gradient
-
-MAXWELL_MEDIAN = 1.538  # median length of a vector of three normal deviates of variance one
-STRONG = 99  # percentile of the gradients that stands for those of the structure
-CLEARLY = 0.25  # of that is enough, however noisy
-BLANK = 1e-5  # of the grey level: less is round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,27 +43,6 @@ def sample(grid: SplineGrid, coefficients: np.ndarray, stride: int, clear: float
     grey, gradient, _ = spline_value_gradient(coefficients, points.points)
     weight = np.full(len(grey), float(stride**3))
     return Sampling(grid, points, grey, gradient.astype(float), weight)
-
-
-def clear_points(coefficients: np.ndarray, stride: int, clear: float) -> np.ndarray:
-    """Every stride-th voxel centre whose gradient exceeds `clear` times the noise (Q, 3).
-
-    The noise is that of the median voxel, which lies in the void. A quarter of the strong gradients
-    is enough: in a texture, which has no void, most voxels take part."""
-    lines = [np.arange(stride // 2, n, stride, dtype=float) for n in coefficients.shape]
-    plane = np.stack(np.meshgrid(*lines[1:], indexing="ij"), axis=-1).reshape(-1, 2)
-    length = np.empty((len(lines[0]), len(plane)), np.float32)
-    for i, x in enumerate(lines[0]):  # plane by plane: all points at once would take gigabytes
-        points = np.column_stack([np.full(len(plane), x), plane])
-        length[i] = np.linalg.norm(spline_value_gradient(coefficients, points)[1], axis=1)
-    noise, strong = np.median(length) / MAXWELL_MEDIAN, np.percentile(length, STRONG)
-    if strong <= BLANK * np.abs(coefficients).max():
-        raise CorrelationError(
-            f"the gradient of the reference is at most {strong:.1e} grey level a voxel at {STRONG} % "
-            "of its voxels: it is blank; check the scan, or leave freeform out of meso.candidates"
-        )
-    i, j = np.nonzero(length > min(clear * noise, CLEARLY * strong))
-    return np.column_stack([lines[0][i], plane[j]])
 
 
 def linearise(

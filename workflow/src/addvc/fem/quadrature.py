@@ -37,17 +37,24 @@ def gauss_points(mesh: Mesh, per_tet: int = 4) -> Quadrature:
     return Quadrature(cell, np.tile(shape, (len(mesh.cells), 1)), points, weight)
 
 
-def voxel_points(mesh: Mesh, image_shape: tuple[int, int, int], stride: int = 1) -> Quadrature:
+def voxel_points(
+    mesh: Mesh,
+    image_shape: tuple[int, int, int],
+    stride: int = 1,
+    chosen: np.ndarray | None = None,
+) -> Quadrature:
     """Centres of the voxels inside a tetrahedral mesh, each owned by one cell, weight 1.
 
-    With a `stride` one voxel in stride**3 is kept and weighs as much. Raises MeshError when no
-    voxel is inside."""
+    With a `stride` one voxel in stride**3 is kept and weighs as much; of these only the `chosen`
+    ones, bool of `image_shape`. Raises MeshError when no voxel is inside."""
     owner = voxel_owner(mesh.points, mesh.cells, np.asarray(image_shape, dtype=np.int64))
+    if chosen is not None:
+        owner[~chosen] = -1
     kept = (slice(None, None, stride),) * 3
     index = np.flatnonzero(owner[kept].ravel() >= 0)
     if len(index) == 0:
         raise MeshError(
-            f"no voxel of the image {tuple(image_shape)} is inside the mesh, which "
+            f"no voxel that counts of the image {tuple(image_shape)} is inside the mesh, which "
             f"spans {mesh.points.min(0)} to {mesh.points.max(0)}; check the units"
         )
     cell = owner[kept].ravel()[index]

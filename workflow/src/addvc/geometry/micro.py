@@ -7,6 +7,9 @@ from scipy.spatial import cKDTree
 
 from addvc.errors import MeshError
 from addvc.fem.mesh import Mesh, boundary_faces, cell_volumes, check_mesh
+from addvc.geometry.region import Region, node_classes
+from addvc.geometry.skeleton import strut_graph
+from addvc.geometry.stubs import pruned
 from addvc.geometry.stuffing import stuff
 from addvc.geometry.surface import Surface, enclosed_volume, remeshed
 from addvc.geometry.tets import TetOptions, largest_piece, tetrahedralise
@@ -15,12 +18,13 @@ log = logging.getLogger(__name__)
 
 
 def micro_mesh(
-    grey: np.ndarray, gamma: float, surface: Surface, options: dict
+    grey: np.ndarray, gamma: float, surface: Surface, region: Region, options: dict
 ) -> tuple[Mesh, dict]:
     """Tetrahedra of {grey > gamma} in one piece, and the figures of the mesh.
 
-    `options` is the `mesh` section of the configuration. Raises MeshError when the largest piece
-    holds less than `min_kept` of the volume, or a cell is inverted or too flat."""
+    `options` is the `mesh` section of the configuration; `mend: prune` cuts dangling stubs off.
+    Raises MeshError when the largest piece holds less than `min_kept` of the volume, or a cell is
+    inverted or too flat."""
     if options["backend"] == "pytetwild":
         small = remeshed(surface, options["size"])
         mesh = tetrahedralise(small, TetOptions(options["size"]))
@@ -33,6 +37,9 @@ def micro_mesh(
             "lower mesh.size"
         )
     mesh, pieces = largest_piece(mesh)
+    if options["mend"] == "prune":
+        cut = node_classes(mesh, region, "free")["surface"] > 0
+        mesh, pieces["pruned_stubs"] = pruned(mesh, strut_graph(grey > gamma), cut)
     figures = check_mesh(mesh, "micro mesh", options["min_dihedral"]) | pieces
     figures |= {
         "kept_fraction": figures["volume"] / whole,

@@ -1,4 +1,4 @@
-"""Fig. 3, 5, 7, 8, 9: the specimen, the meshes and the region, rendered."""
+"""Fig. 3, 5, 7, 8, 9, 14: the specimen, the meshes and the region, rendered."""
 
 from collections.abc import Iterable
 
@@ -10,14 +10,17 @@ from addvc.images.platens import find_platens
 from addvc.images.spline import gaussian_blur
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, Picture, View, aspect, oblique, render
+from addvc.report.scene import Layer, Picture, View, aspect, facing, oblique, render
 from addvc.report.surfaces import (
     boundary,
     box_corners,
     centroids,
+    clipped,
     compact,
     in_box,
     segmented,
+    slab,
+    slab_box,
     whole_foam,
 )
 
@@ -171,3 +174,37 @@ def penalised(case: Case, outputs: Iterable[str]) -> None:
     ]
     fig.legend(handles=handles, loc="outside lower center", ncols=3, columnspacing=1)
     style.save(fig, outputs)
+
+
+def local_region(case: Case, outputs: Iterable[str]) -> None:
+    """Fig. 14: the slice of Fig. 15 to 17, (a) in the whole foam, (b) alone, towards the viewer."""
+    mesh, specimen, size = case.mesh("micro"), case.specimen, case.cell_size
+    normal, first, last = slab(mesh, specimen.axis, size)
+    box = slab_box(mesh, specimen.axis, size)
+    cut = Layer(*clipped(mesh, *box)[:2], style.BLUE)
+    behind, before = _around(case, box, normal)
+    side = oblique(specimen.axis, 30 if normal == (specimen.axis + 1) % 3 else 60)
+    view = facing(specimen.axis, normal)
+    pictures = {
+        "slab (blue) in the foam (grey)": render([behind, cut, before], side, 80),
+        "the slab alone, along its normal": render([cut], view, 80, shadows=True),
+    }
+    tallest = max(picture.aspect for picture in pictures.values())
+    fig, axes = style.panels(1, 2, tallest, spare=18, below=8)
+    for panel, (ax, (title, picture)) in enumerate(zip(axes[0], pictures.items(), strict=True)):
+        picture.show(ax)
+        style.headline(ax, title, panel)
+        style.scale_bar(ax, case.voxel_um())
+    thick = f"{last - first:.1f} voxels thick ({(last - first) / size:.2f} cell size)"
+    fig.supxlabel(f"slab: {thick}, normal to {style.AXES[normal]}", fontsize=8.5)
+    style.save(fig, outputs)
+
+
+def _around(case: Case, box: tuple, normal: int) -> tuple[Layer, Layer]:
+    """The foam without what is in a box: behind it and beside it, and, hardly to be seen, before it."""
+    specimen = case.specimen
+    points, faces = whole_foam(case.image(0)[0], case.gamma, specimen, specimen.low, specimen.high)
+    middle = points[faces].mean(axis=1)
+    before = middle[:, normal] > box[1][normal]
+    rest = ~before & ~in_box(middle, *box)
+    return Layer(points, faces[rest]), Layer(points, faces[before], opacity=0.1)

@@ -131,10 +131,23 @@ class Case:
             return "failed"
         return "" if converged else "not converged"
 
+    def flagged(self, state: int) -> int:
+        """How many struts the default micro method cannot be trusted on."""
+        foam = self.json(f"struts_state{state}.json")["foam"]
+        return int(foam[self.micro[0]]["flagged"])
+
+    def verdict(self, mesh: str, state: int) -> str:
+        """What to think of a result: `converged`, `not converged` or `failed`; of the default micro
+        method with the number of struts that are flagged."""
+        words = self.status(mesh, state) or "converged"
+        if mesh != self.micro[0] or words == "failed":
+            return words
+        count = self.flagged(state)
+        return f"{words}, {count} struts flagged" if count else words
+
     def title(self, state: int, mesh: str) -> str:
-        """The label of a state, and what is wrong with its result on a mesh."""
-        status = self.status(mesh, state)
-        return self.labels[state] + (f": {status}" if status else "")
+        """The label of a state, and what to think of its result on a mesh."""
+        return f"{self.labels[state]}: {self.verdict(mesh, state)}"
 
     def shown_state(self) -> int:
         """The last state that both the finest meso mesh and `micro` got right, else the last."""

@@ -51,7 +51,7 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
 def histograms(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 12: density of r over the struts, all states: finest meso mesh, each micro method."""
     names = [case.finest, *case.micro]
-    fig = style.figure(72)
+    fig = style.figure(92)
     axes = fig.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
     reach = _reach(case)
     for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
@@ -61,12 +61,12 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         style.headline(ax, f"{kind} ({name})", number)
         ax.set_xlabel("residual r (grey levels)")
         ax.xaxis.set_major_locator(MaxNLocator(5))
-        ax.legend(loc="upper left", handlelength=1.2, borderaxespad=0.1)
+        ax.legend(loc="upper left", handlelength=1.2, borderaxespad=0.1, fontsize=7)
     low, high = axes[0].get_ylim()
     axes[0].set(
         ylabel="density (1 / grey level)",
         xlim=(-reach, reach),
-        ylim=(low, low + (high - low) * (1.05 + 0.09 * len(case.states))),
+        ylim=(low, low + (high - low) * (1.05 + 0.13 * len(case.states))),
     )
     style.save(fig, outputs)
 
@@ -87,7 +87,7 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
     r, weight, stats = case.residual(name, state)
     counts, edges = np.histogram(r, bins=120, range=(-reach, reach), weights=weight)
     density = counts / (weight.sum() * np.diff(edges))
-    label = f"{case.title(state, name)}, σ = {stats['std']:.2f}"
+    label = f"{case.labels[state]}, σ = {stats['std']:.2f}\n{case.verdict(name, state)}"
     ax.plot(
         (edges[1:] + edges[:-1]) / 2,
         density,
@@ -117,10 +117,11 @@ def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float])
         ax.set_axis_off()
     for ax in axes[::columns]:
         ax.set_ylabel("rms(du) (voxels)")
-    handles = [style.line(style.SERIES[(n - 1) % 6], case.labels[n]) for n in case.states]
+    titles = {n: case.title(n, case.micro[0]) for n in case.states}
+    handles = [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
     handles.append(style.line("#777777", "criterion", ls=":"))
     handles.append(style.line(style.RED, "not converged", ls="", marker="x"))
-    fig.legend(handles=handles, loc="outside lower center", ncols=6)
+    fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
 
 
@@ -171,7 +172,8 @@ def _error_panels(case: Case, names: Sequence[str]) -> tuple:
     for number, (ax, text) in enumerate(zip(axes, titles, strict=False)):
         style.headline(ax, text, number)
         ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
-        ax.set_xticklabels([case.labels[n] for n in case.states])
+        titles = [style.narrow(case.title(n, case.micro[0])) for n in case.states]
+        ax.set_xticklabels(titles, fontsize=7)
         ax.yaxis.set_major_formatter("{x:g}")
         ax.grid(axis="y", which="both", lw=0.3, color="#dddddd")
     axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")

@@ -22,11 +22,12 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
         for n in case.states
     }
     norm, columns = _residual_range(case, values), len(case.states)
-    fig, axes = style.panels(len(names), columns, aspect(view, mesh.points), 8, 18, below=6)
+    fig, axes = style.panels(len(names), columns, aspect(view, mesh.points), 15, 18, below=6)
     for panel, ((name, state), r) in enumerate(values.items()):
         layer = Layer(mesh.points, faces, values=r, norm=norm, cmap=style.SIGNED)
         render([layer], view, 150 / columns).show(axes.flat[panel])
-        style.headline(axes.flat[panel], case.title(state, name), panel)
+        title = case.title(state, name).replace(", ", ",\n")
+        style.headline(axes.flat[panel], title, panel)
     for ax, name in zip(axes[:, 0], names, strict=True):
         style.row_name(ax, name)
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
@@ -56,7 +57,7 @@ def fields(case: Case, outputs: Iterable[str]) -> None:
     labels = [f"$u_{x}$ ({style.voxels(case.voxel_um())})" for x in style.AXES]
     labels.append(r"strain $\|\varepsilon\|_F$ (–)")
     view = facing(case.specimen.axis, slab(case.mesh("micro"), case.specimen.axis, 1)[0])
-    fig, axes = style.panels(4, 2, aspect(view, slices[0][0]), 7, 18, below=6)
+    fig, axes = style.panels(4, 2, aspect(view, slices[0][0]), 11, 18, below=6)
     for d, label in enumerate(labels):
         pair = [fields[d] for _, _, fields in slices]
         norm, cmap = _strain_range(pair) if d == 3 else style.component_range(pair)

@@ -17,13 +17,14 @@ FIGURES = {
 
 
 def starts(case: Case, outputs: Iterable[str]) -> None:
-    """A row for each candidate of each state: first for the coarsest mesh, then for micro DVC."""
+    """A row for each candidate of each state: the meso meshes, coarse to fine, then micro DVC."""
     rows = [["State", "Start of", "Candidate", "Taken", *(name for name, _ in FIGURES.values())]]
     for state in case.states:
-        for result, file in ((case.meso[0], "start"), ("micro", "micro_start")):
+        files = {case.meso[0]: "start"} | {name: name for name in case.meso[1:]}
+        for result, file in (files | {"micro": "micro_start"}).items():
             notes = load_notes(case.path(f"dvc/{file}_state{state}.h5"))
             rows += [
-                [case.labels[state], result, *_row(one, notes["best"])]
+                [case.title(state, case.micro[0]), result, *_row(one, notes["best"])]
                 for one in notes["candidates"]
             ]
     for path in outputs:

@@ -36,7 +36,7 @@ def network(case: Case, outputs: Iterable[str]) -> None:
         return
     points, faces, owner = tubes(struts, junctions)
     sources = {case.micro[0]: "", case.finest: MESO}
-    fig, axes = style.panels(2, 2, aspect(view, points), spare=9, bar=16)
+    fig, axes = style.panels(2, 2, aspect(view, points), spare=13, bar=16)
     for row, (ax, column) in enumerate(zip(axes, COMPARED, strict=True)):
         valid = table["valid"] > 0
         norm = Normalize(0, 1) if row == 0 else strain_range(table, sources.values())
@@ -50,7 +50,7 @@ def network(case: Case, outputs: Iterable[str]) -> None:
                 Layer(points, faces[owner == FREE_END], colour="#9a9a9a"),
             ]
             render(layers, view, style.WIDTH / 2, points, shadows=True).show(ax[panel])
-            style.headline(ax[panel], f"{case.title(state, name)}, {name}", 2 * row + panel)
+            style.headline(ax[panel], f"{name}, {case.title(state, name)}", 2 * row + panel)
         label = "share of bending (–)" if row == 0 else "axial strain (–)"
         style.colour_bar(fig, ax, norm, cmap, label, shrink=0.7)
     style.scale_bar(axes[1, 0], case.voxel_um(), 0.4)

@@ -33,7 +33,7 @@ def against_truth(case: Case, outputs: Iterable[str]) -> None:
     tables = {state: columns(case, state, True) for state in case.states}
     count = len(tables)
     width = max(min(62.0, style.WIDTH / count) * count, 0.6 * style.WIDTH)
-    fig = style.figure(124, width)
+    fig = style.figure(132, width)
     axes = fig.subplots(2, count, squeeze=False)
     for column, (state, table) in enumerate(tables.items()):
         sources = results(case, table)
@@ -43,7 +43,7 @@ def against_truth(case: Case, outputs: Iterable[str]) -> None:
             for own, colour in sources.values():
                 pair = (unit * table[name + ending][use] for ending in (truth, own))
                 scatter(ax, *pair, colour, wide=row == 1)
-            title = case.title(state, case.micro[0]).replace(": ", ":\n")
+            title = case.title(state, case.micro[0]).replace(", ", ",\n")
             style.headline(ax, title, count * row + column)
             ax.set_xlabel(("share of bending,\ntruth (–)", "axial strain,\ntruth (%)")[row])
     axes[0, 0].set_ylabel("share of bending, measured (–)")
@@ -68,7 +68,15 @@ def truth_rows(case: Case) -> list[list[str]]:
     """The table: figures of each result against both truths, a column a state."""
     read = {n: case.json(f"analysis/struts_truth_state{n}.json") for n in case.states}
     first = read[case.states[0]]
-    rows = [["Struts", "Against", "Quantity", "Unit", *(case.labels[n] for n in case.states)]]
+    rows = [
+        [
+            "Struts",
+            "Against",
+            "Quantity",
+            "Unit",
+            *(case.title(n, case.micro[0]) for n in case.states),
+        ]
+    ]
     names = {"field": "true displacement", "beams": "beams of the twin"}
     flags = {n: read[n].pop("flags") for n in case.states}
     for key, quantity in FLAGS.items():

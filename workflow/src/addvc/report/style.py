@@ -1,5 +1,7 @@
 """How figures look: sizes, fonts, colours, ranges, bars, and how they are written."""
 
+import re
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -25,6 +27,7 @@ SOLID, BLUE, RED, ORANGE, DARK = "#c6ccd3", "#3d86cf", "#c8341f", "#e08214", "#3
 SERIES = ("#440154", "#31688e", "#35b779", "#e6a000", "#c51b7d", "#7f7f7f")
 MARKERS = "osD^vP"
 AXES = "xyz"
+LONG, NARROW = 28, 14  # characters: of a title that takes two lines, of a line below a tick
 
 plt.rcParams.update(
     {
@@ -74,12 +77,30 @@ def letter(number: int) -> str:
 
 
 def headline(ax: Axes, text: str, number: int | None = None) -> None:
-    """Title of a panel with its letter; in red when it tells of a failure."""
+    """Title of a panel with its letter, a long one in two lines; in red when it tells of a failure."""
     lead = "" if number is None else f"{letter(number)} "
-    wrong = "failed" in text or "not converged" in text
-    ax.set_title(
-        lead + text, loc="left", color=RED if wrong else "black", fontsize=8 if wrong else None
-    )
+    wrong, text = is_wrong(text), two_lines(lead + text)
+    size = 7.5 if "\n" in text else 8 if wrong else None
+    ax.set_title(text, loc="left", color=RED if wrong else "black", fontsize=size)
+
+
+def is_wrong(text: str) -> bool:
+    """Whether words about a result tell of a failure."""
+    return "failed" in text or "not converged" in text
+
+
+def two_lines(text: str) -> str:
+    """A long text broken before what it says of a result."""
+    if len(text) <= LONG:
+        return text
+    return re.sub(r": (?=(not )?converged|failed)", ":\n", text, count=1)
+
+
+def narrow(text: str) -> str:
+    """The title of a state as lines of a word or two, for a tick."""
+    label, _, words = text.partition(": ")
+    parts = words.replace(", ", ",\n").splitlines()
+    return "\n".join([label, *(line for part in parts for line in textwrap.wrap(part, NARROW))])
 
 
 def robust_range(

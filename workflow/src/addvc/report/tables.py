@@ -5,6 +5,7 @@ import html
 from collections.abc import Iterable
 from pathlib import Path
 
+from addvc.analysis.overlap import REST
 from addvc.correlation.meso import meso_options
 from addvc.correlation.micro import micro_options
 from addvc.images.files import atomic_path
@@ -163,12 +164,42 @@ def _ultimate(case: Case, name: str, key: str) -> str:
 
 
 def _outcome(case: Case, name: str) -> dict[str, str]:
-    """Iterations and sigma(r) on the mesh's own points, a row a state."""
+    """Iterations, verdict, and sigma(r) on the mesh's own points, a row a state each."""
     rows = {}
     for state in case.states:
         solution = case.solution(name, state)
-        mark = "" if solution.converged else " (not converged)"
         label = case.labels[state]
-        rows[f"Iterations, {label}"] = f"{solution.iterations}{mark}"
+        rows[f"Iterations, {label}"] = str(solution.iterations)
+        rows[f"Verdict, {label}"] = case.verdict(name, state)
         rows[f"σ(r), {label} (grey levels)"] = f"{solution.residual['std']:.3f}"
     return rows
+
+
+OVERLAP = {
+    "dice": ("Overlap of the solids (Dice) (–)", "{:.3f}"),
+    "distance_median": ("Distance of the surfaces, median (voxels)", "{:.3f}"),
+    "distance_p95": ("Distance of the surfaces, 95th percentile (voxels)", "{:.3f}"),
+    "missed": ("Surface of the image that is missed (%)", "{:.1%}"),
+    "outside": ("Surface outside of the image (%)", "{:.1%}"),
+}
+
+
+def overlaps(case: Case, outputs: Iterable[str]) -> None:
+    """How well each result carries the whole micro mesh onto the deformed image; first the mesh at
+    rest on the reference, which is what can be had."""
+    found = {n: case.json(f"analysis/warp_state{n}.json") for n in case.states}
+    rows = [["State", "Result", *(name for name, _ in OVERLAP.values())]]
+    rows.append(["reference", "mesh at rest", *_overlap(found[case.states[0]][REST])])
+    for state, results in found.items():
+        rows += [
+            [case.title(state, name), name, *_overlap(results[name])]
+            for name in (case.finest, *case.micro)
+        ]
+    for path in outputs:
+        write_table(path, rows)
+
+
+def _overlap(found: dict) -> list[str]:
+    """The figures of one result, percentages without their sign."""
+    values = [(found[key], form) for key, (_, form) in OVERLAP.items()]
+    return ["–" if x is None else form.format(x).rstrip("%") for x, form in values]

@@ -13,7 +13,6 @@ from addvc.report.scene import Layer, View, aspect, facing, render
 from addvc.report.surfaces import boundary, clipped, segmented, slab, slab_box
 
 MESO, MICRO = "#e0903c", "#3d86cf"
-NEAR = 1.5  # voxels from the middle of a triangle: its plane stands for the surface
 
 
 def warped(case: Case, outputs: Iterable[str]) -> None:
@@ -22,41 +21,37 @@ def warped(case: Case, outputs: Iterable[str]) -> None:
     u = {name: case.displacement(name, state) for name in (case.finest, case.micro[0])}
     before = slab_box(mesh, axis, case.cell_size)
     after = _carried_box(mesh, u[case.micro[0]], before, axis)
-    image = segmented(case.image(state)[0], case.gamma, *after)
-    bodies = {
-        "segmented $I_r$": segmented(case.image(0)[0], case.gamma, *before),
-        f"segmented $I_d$, {case.labels[state]}": image,
-    }
+    images = (0, before), (state, after)
+    surfaces = [segmented(case.image(n)[0], case.gamma, *box) for n, box in images]
+    titles = "segmented $I_r$", f"segmented $I_d$, {case.labels[state]}"
+    bodies = dict(zip(titles, surfaces, strict=True))
     for name in u:
-        title = f"$I_r$ carried by {name}{_failure(case, name, state)}"
+        title = f"$I_r$ carried by {name}: {case.verdict(name, state)}"
         bodies[title] = _cut(mesh, u[name], *after)
-    _draw_warped(bodies, image, facing(axis, slab(mesh, axis, 1)[0]), case.voxel_um(), outputs)
+    found = case.json(f"analysis/warp_state{state}.json")
+    words = [_words(found[name]) for name in u]
+    _draw_warped(bodies, words, facing(axis, slab(mesh, axis, 1)[0]), case.voxel_um(), outputs)
 
 
-def _draw_warped(bodies: dict, image, view: View, voxel_um: float, outputs) -> None:
-    """The four surfaces of Fig. 16 at one scale, the carried ones with their distance to I_d."""
+def _draw_warped(bodies: dict, words: list, view: View, voxel_um: float, outputs) -> None:
+    """The four surfaces of Fig. 16 at one scale, `words` below the carried ones."""
     fit = np.vstack([points for points, _ in bodies.values() if len(points)])
-    fig, axes = style.panels(2, 2, aspect(view, fit), spare=16)
+    fig, axes = style.panels(2, 2, aspect(view, fit), spare=20)
     colours = style.SOLID, style.SOLID, MESO, MICRO
     for panel, (ax, (title, body)) in enumerate(zip(axes.flat, bodies.items(), strict=True)):
         render([Layer(*body, colours[panel])], view, 82, fit, shadows=True).show(ax)
         style.headline(ax, title, panel)
         if panel > 1:
-            _write_gap(ax, _gap(body[0], image))
+            style.note(ax, words[panel - 2], y=-0.02)
     style.scale_bar(axes[0, 0], voxel_um, 0.2)
     style.save(fig, outputs)
 
 
-def _write_gap(ax, gap: np.ndarray) -> None:
-    """Below a panel, how far the carried surface is from the segmented image."""
-    middle, far = np.percentile(gap, (50, 95)) if len(gap) else (np.nan, np.nan)
-    text = f"distance to $I_d$: median {middle:.2f}, p95 {far:.2f} voxels"
-    style.note(ax, text, y=-0.02)
-
-
-def _failure(case: Case, name: str, state: int) -> str:
-    status = case.status(name, state)
-    return f" ({status})" if status else ""
+def _words(found: dict) -> str:
+    """How well the whole mesh is carried, not the slice alone."""
+    figures = (found["dice"], found["distance_median"], found["distance_p95"])
+    overlap, middle, far = ("–" if x is None else f"{x:.2f}" for x in figures)
+    return f"whole mesh: overlap {overlap}\ndistance {middle}, p95 {far} voxels"
 
 
 def _carried_box(mesh: Mesh, u: np.ndarray, box: tuple, axis: int) -> tuple[np.ndarray, np.ndarray]:
@@ -78,20 +73,6 @@ def _carried_box(mesh: Mesh, u: np.ndarray, box: tuple, axis: int) -> tuple[np.n
 def _cut(mesh: Mesh, u: np.ndarray, low, high) -> tuple[np.ndarray, np.ndarray]:
     """Surface of the mesh carried by u, inside a box."""
     return clipped(Mesh(mesh.points + u, mesh.cells), low, high)[:2]
-
-
-def _gap(points: np.ndarray, image: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Distance (n,) of points to a segmented image, voxels: to the plane of the nearest triangle,
-    or to its middle when that is farther than its plane says."""
-    surface, faces = image
-    if len(faces) == 0:
-        return np.full(len(points), np.nan)
-    a, b, c = (surface[faces[:, n]] for n in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    distance, nearest = cKDTree((a + b + c) / 3).query(points)
-    above = np.abs(np.einsum("ni,ni->n", points - a[nearest], normal[nearest]))
-    return np.where(distance < NEAR, above, distance)
 
 
 def zoom(case: Case, outputs: Iterable[str]) -> None:
@@ -120,7 +101,7 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
 
 
 def _zoom_title(case: Case, name: str, state: int) -> str:
-    return rf"$\Omega_d$ and $\Omega_r + u$, {name}{_failure(case, name, state)}"
+    return rf"$\Omega_d$ and $\Omega_r + u$, {name}: {case.verdict(name, state)}"
 
 
 def _places(case: Case, mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:

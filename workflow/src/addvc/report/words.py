@@ -175,6 +175,7 @@ def warnings(summary: dict) -> list[str]:
             f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
             "and was left out; lower mesh.size, the porosity or images.blur."
         )
+    found += topology_warnings(summary.get("topology"))
     if not any(state[micro_name(summary)]["error"] for state in summary["states"]):
         found.append(
             "- The error on these images is not known: the residual and the ultimate error "
@@ -186,6 +187,23 @@ def warnings(summary: dict) -> list[str]:
         for check in failed_checks(summary)
     ]
     return found or ["None."]
+
+
+def topology_warnings(counts: dict | None) -> list[str]:
+    """One line when the mesh of the struts has stubs, necks or welds."""
+    names = {
+        "stubs": "dangling stubs",
+        "necks": "necks thinner than a square voxel",
+        "welds": "welds torn by the displacement",
+    }
+    some = [f"{counts[key]} {name}" for key, name in names.items() if counts and counts[key]]
+    if not some:
+        return []
+    return [
+        f"- The mesh of the struts has {', '.join(some)} (0 of each in a foam): see the figure of "
+        "its topology, and geometry/topology.json for where. Elastic energy (`corotational`) holds "
+        "them; trust `eq10` least there. Lower images.blur or mesh.size, or change porosity."
+    ]
 
 
 def state_warnings(state: dict, summary: dict) -> list[str]:

@@ -1,0 +1,124 @@
+"""What a run of the workflow measured on one case, and at what cost: beside it goes the peer."""
+
+import csv
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from addvc import config as settings
+from addvc.analysis.truth import Judge, load_truth
+from addvc.correlation.corotational import Problem, corotational
+from addvc.correlation.micro import elastic, mending, micro_options, micro_reference, stages
+from addvc.correlation.store import load_field, load_order
+from addvc.errors import AddvcError
+from addvc.fem.io import read_mesh, read_vtu
+from addvc.fem.shell import load_quadrature
+from addvc.images.files import read_json
+from addvc.images.scans_store import load_volume
+
+RESULTS = {"meso12": "meso 12", "freeform": "free-form", "micro-eq10": "micro, Eq. 10",
+           "micro": "micro, corotational"}  # fmt: skip
+"""What is compared of a case of the workflow, with its name in tables."""
+
+MESO = [
+    *("smooth/state{s}", "start/zero_state{s}", "start/platens_state{s}", "freeform/state{s}"),
+    *("freeform_on/meso33_state{s}", "rescale/zero_state{s}", "rescale/platens_state{s}"),
+    *("rescale/freeform_state{s}", "best_start/state{s}", "meso_dvc/meso33_state{s}"),
+    *("meso_dvc/meso23_state{s}", "meso_dvc/meso12_state{s}"),
+]
+MICRO = [*MESO, "freeform_on/micro_state{s}", "transfer/state{s}", "micro_start/state{s}"]
+JOBS = {
+    "meso12": MESO,
+    "freeform": ["smooth/state{s}", "freeform/state{s}"],
+    "micro": [*MICRO, "micro_dvc/micro_state{s}"],
+    "micro-eq10": [*MICRO, "micro_dvc/micro-eq10_state{s}"],
+}
+"""Jobs that lead to the displacement of one state, all candidate starts among them. Meshes and
+factors, made once a reference, are apart: `ONCE`."""
+
+ONCE = ("cell_size", "threshold", "surface", "micro_mesh", "solid", "penalised_nodes", "shell",
+        "factor", "meso_mesh", "platen_grid", "specimen")  # fmt: skip
+
+
+def cpu_seconds(path: Path) -> float:
+    """CPU time of one job, from the benchmark file that snakemake wrote."""
+    with path.open() as file:
+        text = next(csv.DictReader(file, delimiter="\t"))["cpu_time"]
+    try:
+        return float(text)
+    except ValueError:  # "NA": too short to be sampled
+        return 0.0
+
+
+def cost(folder: Path, result: str, state: int) -> float:
+    """CPU seconds of all jobs that lead to a result in one state."""
+    return sum(
+        cpu_seconds(folder / f"benchmarks/{job.format(s=state)}.tsv") for job in JOBS[result]
+    )
+
+
+def cost_once(folder: Path) -> float:
+    """CPU seconds of meshes and factors, which all states share."""
+    return sum(
+        cpu_seconds(path) for rule in ONCE for path in folder.glob(f"benchmarks/{rule}/*.tsv")
+    )
+
+
+def targets(case: str, states: Iterable[int]) -> list[str]:
+    """What the workflow must make of a case: the errors of all that is compared."""
+    return [
+        f"results/{case}/analysis/error_{name}_state{state}.json"
+        for state in states
+        for name in RESULTS
+    ]
+
+
+def truth_of(config: dict) -> Judge:
+    """The truth of a case of the workflow, from its whole configuration."""
+    if settings.case_kind(config) == "twin":
+        return load_truth(Path(settings.twin_folder(settings.twin_parts(config)[0]), "motion.h5"))
+    if "truth" not in config:
+        raise AddvcError(
+            f"case {config['case']} has neither `twin` nor `truth`: give one, errors need it"
+        )
+    return load_truth(config["truth"])
+
+
+def bulk_nodes(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) of the micro mesh and where errors are measured (n,) bool: not penalised."""
+    points, _, classes, _ = read_vtu(folder / "geometry/micro.vtu")
+    return points, classes["penalised"] == 0
+
+
+def micro_with(folder: Path, config: dict, state: int, l_e: float) -> tuple[np.ndarray, float]:
+    """u (n, 3) by the default method with another cut-off l_E of its energy, from the same start, and
+    its CPU seconds, the factor of a mesh at rest not being needed."""
+    start = time.process_time()
+    micro, levels = config["micro"] | {"l_e": l_e}, read_json(folder / "geometry/threshold.json")
+    cell = read_json(folder / "geometry/cell_size.json")["cell_size"]
+    images = [load_volume(folder / f"volumes/smooth{n}.h5")[0] for n in (0, state)]
+    reference = micro_reference(
+        read_mesh(folder / "geometry/micro.vtu"),
+        images[0],
+        load_quadrature(folder / "geometry/shell.h5"),
+    )
+    _, _, weights = elastic(reference, micro_options(micro, cell, settings.loading_axis(config)))
+    order, _ = load_order(folder / "dvc/micro_factor.h5")
+    problem = Problem(reference, weights["c"], micro["nu"], order)
+    u = load_field(folder / f"dvc/micro_start_state{state}.h5")
+    plan = stages(micro, levels), mending(micro, levels)
+    solution, _ = corotational(problem, images[1], u, *plan)
+    return solution.u, time.process_time() - start
+
+
+def rows_of_study(folder: Path, states: Iterable[int]) -> list[dict]:
+    """One row for each state and result of the workflow: errors and CPU seconds."""
+    return [
+        {"state": state, "tool": label, "settings": ""}
+        | read_json(folder / f"analysis/error_{name}_state{state}.json")
+        | {"cpu_s": cost(folder, name, state)}
+        for state in states
+        for name, label in RESULTS.items()
+    ]

@@ -1,0 +1,16 @@
+"""A threshold whose height above the void is that of the case times a factor."""
+
+from addvc.geometry.threshold import find_threshold
+from addvc.images.files import read_json, write_json
+from addvc.images.scans import load_volume
+from addvc.images.specimen import Specimen
+from addvc.runtime import job
+
+with job(snakemake) as log:
+    source, params = snakemake.input, snakemake.params
+    levels = read_json(source.threshold)
+    gamma = levels["void"] + params.factor * (levels["threshold"] - levels["void"])
+    specimen = Specimen.from_dict(read_json(source.specimen))
+    result = find_threshold(load_volume(source.smooth)[0], specimen, params.porosity, gamma)
+    log.info("threshold %.2f, porosity %.4f", result["threshold"], result["porosity"])
+    write_json(snakemake.output[0], result)
