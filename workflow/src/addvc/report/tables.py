@@ -39,6 +39,12 @@ def write_table(path: str | Path, rows: Rows) -> None:
         csv.writer(file, lineterminator="\n").writerows(rows)
 
 
+def write_tables(outputs: Iterable[str | Path], rows: Rows) -> None:
+    """The same table under each name."""
+    for path in outputs:
+        write_table(path, rows)
+
+
 def page(rows: Rows) -> str:
     """A table as a page for a browser."""
     cells = [
