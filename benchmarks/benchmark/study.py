@@ -89,11 +89,11 @@ def bulk_nodes(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return points, classes["penalised"] == 0
 
 
-def micro_with(folder: Path, config: dict, state: int, l_e: float) -> tuple[np.ndarray, float]:
-    """u (n, 3) by the default method with another cut-off l_E of its energy, from the same start, and
-    its CPU seconds, the factor of a mesh at rest not being needed."""
+def micro_with(folder: Path, config: dict, state: int, changes: dict) -> tuple[np.ndarray, float]:
+    """u (n, 3) by the default method with changes to the `micro` section, from the same start, and
+    its CPU seconds, assembly included."""
     start = time.process_time()
-    micro, levels = config["micro"] | {"l_e": l_e}, read_json(folder / "geometry/threshold.json")
+    micro, levels = config["micro"] | changes, read_json(folder / "geometry/threshold.json")
     cell = read_json(folder / "geometry/cell_size.json")["cell_size"]
     images = [load_volume(folder / f"volumes/smooth{n}.h5")[0] for n in (0, state)]
     reference = micro_reference(
