@@ -37,21 +37,22 @@ rule band:
         "scripts/band.py"
 
 
-rule l_e:
+rule variant:
     input:
         f"{R}/study_{{case}}.json",
     output:
-        f"{R}/l_e/{{case}}_{{l_e}}.json",
+        f"{R}/variants/{{case}}_{{variant}}.json",
     log:
-        f"{R}/logs/l_e/{{case}}_{{l_e}}.log",
+        f"{R}/logs/variant/{{case}}_{{variant}}.log",
     benchmark:
-        f"{R}/benchmarks/l_e/{{case}}_{{l_e}}.tsv"
+        f"{R}/benchmarks/variant/{{case}}_{{variant}}.tsv"
     threads: 1
     resources:
         mem_mb=3000,
         runtime=30,
     params:
-        code=code("l_e.py"),
+        code=code("variant.py"),
+        changes=lambda wildcards: config["variants"][wildcards.case][wildcards.variant],
         folder="results/{case}",
     script:
-        "scripts/l_e.py"
+        "scripts/variant.py"

@@ -14,7 +14,7 @@ wildcard_constraints:
     table="|".join(PREFIX),
     state=r"\d+",
     spacing=r"\d+",
-    l_e=r"\d+",
+    variant=r"\w+",
     settings="|".join(config["elastix"]["settings"]),
 
 
@@ -38,9 +38,10 @@ def found_by_runs(wildcards):
 
 
 def varied(wildcards):
-    """Runs of micro DVC with other cut-offs."""
+    """Runs of micro DVC with other keys."""
     case = PREFIX[wildcards.table]
-    return [f"{R}/l_e/{case}_{length}.json" for length in config["l_e"].get(case, [])]
+    names = config["variants"].get(case, [])
+    return [f"{R}/variants/{case}_{name}.json" for name in names]
 
 
 rule study:

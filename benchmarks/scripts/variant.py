@@ -1,4 +1,4 @@
-"""Micro DVC of a case with another cut-off of its elastic energy: the errors of state 1."""
+"""Micro DVC of a case with other keys of its `micro` section: the errors of state 1."""
 
 from pathlib import Path
 
@@ -9,11 +9,12 @@ from addvc.images.files import read_json, write_json
 from addvc.runtime import job
 
 with job(snakemake) as log:
-    config = read_json(snakemake.input[0])
-    folder, l_e = Path(snakemake.params.folder), float(snakemake.wildcards.l_e)
-    u, cpu = micro_with(folder, config, 1, l_e)
+    config, changes = read_json(snakemake.input[0]), snakemake.params.changes
+    folder = Path(snakemake.params.folder)
+    u, cpu = micro_with(folder, config, 1, changes)
     points, bulk = bulk_nodes(folder)
     (found,) = errors_at(truth_of(config), points[bulk], [u[bulk]], 1)
     log.info("%s", found)
-    row = {"state": 1, "tool": f"micro, l_E = {l_e:g}", "settings": "", "cpu_s": cpu}
+    told = ", ".join(f"{key} {value}" for key, value in changes.items())
+    row = {"state": 1, "tool": "micro, corotational", "settings": told, "cpu_s": cpu}
     write_json(snakemake.output[0], row | found)
