@@ -22,21 +22,16 @@ RESULTS = {"meso12": "meso 12", "freeform": "free-form", "micro-eq10": "micro, E
            "micro": "micro, corotational"}  # fmt: skip
 """What is compared of a case of the workflow, with its name in tables."""
 
-MESO = [
-    *("smooth/state{s}", "start/zero_state{s}", "start/platens_state{s}", "freeform/state{s}"),
-    *("freeform_on/meso33_state{s}", "rescale/zero_state{s}", "rescale/platens_state{s}"),
-    *("rescale/freeform_state{s}", "best_start/state{s}", "meso_dvc/meso33_state{s}"),
-    *("meso_dvc/meso23_state{s}", "meso_dvc/meso12_state{s}"),
-]
-MICRO = [*MESO, "freeform_on/micro_state{s}", "transfer/state{s}", "micro_start/state{s}"]
-JOBS = {
+MESO = ("smooth", "freeform", "start", "best_start", "meso_dvc")
+MICRO = (*MESO, "transfer", "field_on_micro", "micro_start")
+RULES = {
     "meso12": MESO,
-    "freeform": ["smooth/state{s}", "freeform/state{s}"],
-    "micro": [*MICRO, "micro_dvc/micro_state{s}"],
-    "micro-eq10": [*MICRO, "micro_dvc/micro-eq10_state{s}"],
+    "freeform": ("smooth", "freeform"),
+    "micro": MICRO,
+    "micro-eq10": MICRO,
 }
-"""Jobs that lead to the displacement of one state, all candidate starts among them. Meshes and
-factors, made once a reference, are apart: `ONCE`."""
+"""Rules whose jobs for one state lead to its displacement, all candidate starts among them, to which
+micro DVC itself is added. Meshes and factors, made once a reference, are apart: `ONCE`."""
 
 ONCE = ("cell_size", "threshold", "surface", "micro_mesh", "solid", "penalised_nodes", "shell",
         "factor", "meso_mesh", "platen_grid", "specimen")  # fmt: skip
@@ -54,8 +49,10 @@ def cpu_seconds(path: Path) -> float:
 
 def cost(folder: Path, result: str, state: int) -> float:
     """CPU seconds of all jobs that lead to a result in one state."""
+    names = [f"{rule}/*state{state}" for rule in RULES[result]]
+    names += [f"micro_dvc/{result}_state{state}"] if result.startswith("micro") else []
     return sum(
-        cpu_seconds(folder / f"benchmarks/{job.format(s=state)}.tsv") for job in JOBS[result]
+        cpu_seconds(path) for name in names for path in folder.glob(f"benchmarks/{name}.tsv")
     )
 
 

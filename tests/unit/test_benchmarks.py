@@ -1,5 +1,6 @@
 """The benchmarks, but for what needs the peers' packages: the pair and its truth, tables, costs."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -17,6 +18,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 from benchmark.band import Band  # noqa: E402
 from benchmark.pairs import PairOptions, make_pair, strut_nodes, turned  # noqa: E402
+from benchmark.study import ONCE, RULES, cost  # noqa: E402
 from benchmark.tables import best_of, fill, with_ratio, write_csv  # noqa: E402
 
 OPTIONS = PairOptions(side=56, size="tiny", junction=0.9, bow=0.7)
@@ -89,6 +91,24 @@ ROWS = [
 def test_a_peer_is_shown_by_its_best_settings():
     assert best_of(ROWS[1:])["rms"] == 0.1
     assert [row["cpu_ratio"] for row in with_ratio(ROWS, "meso 12")] == [1.0, 2.5, 0.5]
+
+
+def test_costs_are_those_of_rules_that_there_are(tmp_path):
+    text = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
+    rules = {name for names in RULES.values() for name in names} | {*ONCE, "micro_dvc"}
+    assert rules <= set(re.findall(r"rule (\w+):", text))
+    for name in (
+        "smooth/state1",
+        "smooth/state2",
+        "meso_dvc/meso12_state1",
+        "micro_dvc/micro_state1",
+    ):
+        path = tmp_path / f"benchmarks/{name}.tsv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("s\tcpu_time\n3.0\t2.5\n")
+    assert cost(tmp_path, "meso12", 1) == 5.0
+    assert cost(tmp_path, "micro", 1) == 7.5
+    assert cost(tmp_path, "micro-eq10", 1) == 5.0
 
 
 def test_tables_go_between_their_marks(tmp_path):

@@ -89,7 +89,8 @@ def test_the_state_is_the_third_or_the_last():
     asked = CONFIG | {"sensitivity": CONFIG["sensitivity"] | {"state": 4}}
     assert studies.studied_state(asked, [1, 2, 3, 4]) == 4
     with pytest.raises(ConfigError, match="state is 4, but there are 2"):
-        studies.studied_state(asked, [1, 2])
+        studies.check(asked, [1, 2])
+    studies.check(asked, [])  # the reference alone
 
 
 def test_seminorms_vanish_in_a_rigid_motion_and_are_one_for_the_wave(box):

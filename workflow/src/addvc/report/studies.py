@@ -94,13 +94,7 @@ def ablation(found: Sequence[dict], labels: dict[int, str], outputs: Iterable[st
             _mark(ax, states.index(row["state"]) + 0.75 * place, row, name, methods)
         style.headline(ax, name, number)
         ax.set_xticks(range(len(states)), [labels[state] for state in states])
-        ax.set_xlabel("loading state")
-        if not name.startswith("nodes"):
-            ax.set_yscale("log")
-            ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            ax.yaxis.set_minor_formatter("")
-        ax.yaxis.set_major_formatter("{x:g}")
-        ax.grid(axis="y", lw=0.3, color="#dddddd")
+        _scale(ax, logarithmic=not name.startswith("nodes"))
     handles = [
         style.line(style.SERIES[n % 6], method.replace("_", " "), "", style.MARKERS[n % 6])
         for n, method in enumerate(methods)
@@ -109,6 +103,17 @@ def ablation(found: Sequence[dict], labels: dict[int, str], outputs: Iterable[st
     handles.append(style.line(style.RED, "not converged", "", "x"))
     fig.legend(handles=handles, loc="outside lower center", ncols=4)
     style.save(fig, outputs)
+
+
+def _scale(ax: Axes, logarithmic: bool) -> None:
+    """Axes of a panel of the ablation."""
+    ax.set_xlabel("loading state")
+    if logarithmic:
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.yaxis.set_minor_formatter("")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.grid(axis="y", lw=0.3, color="#dddddd")
 
 
 def _quantities(judged: bool) -> list[str]:
@@ -188,14 +193,7 @@ def _columns(part: SubFigure, by_name: dict[str, list[dict]], judged: bool, firs
     axes = part.subplots(2 + judged, len(by_name), sharey="row", sharex="col", squeeze=False)
     for column, (name, rows) in enumerate(by_name.items()):
         x = [row["settings"][name] for row in rows]
-        series = [
-            {style.DARK: [known(row["residual_std"]) for row in rows]},
-            {style.DARK: [100 * row["flagged"] for row in rows]},
-        ]
-        if judged:
-            keys = {style.BLUE: "rms", style.ORANGE: "p95"}
-            series.append({c: [row["error"][key] for row in rows] for c, key in keys.items()})
-        for ax, curves in zip(axes[:, column], series, strict=True):
+        for ax, curves in zip(axes[:, column], _curves(rows, judged), strict=True):
             for colour, y in curves.items():
                 ax.plot(x, y, "-", color=colour, lw=0.9)
                 for row, a, b in zip(rows, x, y, strict=True):
@@ -208,6 +206,22 @@ def _columns(part: SubFigure, by_name: dict[str, list[dict]], judged: bool, firs
     names = ["σ(r)\n(grey levels)", "nodes flagged\n(%)", "error\n(voxels)"]
     for ax, text in zip(axes[:, 0], names, strict=False):
         ax.set_ylabel(text)
+    _legend(part, judged)
+
+
+def _curves(rows: list[dict], judged: bool) -> list[dict[str, list[float]]]:
+    """Colour -> values, for each quantity."""
+    found = [
+        {style.DARK: [known(row["residual_std"]) for row in rows]},
+        {style.DARK: [100 * row["flagged"] for row in rows]},
+    ]
+    keys = {style.BLUE: "rms", style.ORANGE: "p95"}
+    errors = {c: [row["error"][key] for row in rows] for c, key in keys.items()} if judged else None
+    return [*found, errors] if judged else found
+
+
+def _legend(part: SubFigure, judged: bool) -> None:
+    """What lines and marks mean, below all columns."""
     handles = [style.line(style.BLUE, "rms"), style.line(style.ORANGE, "95th percentile")]
     handles = handles if judged else []
     handles.append(style.line(style.DARK, "value in use", "", "o"))
