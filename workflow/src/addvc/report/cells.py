@@ -29,8 +29,8 @@ def cell_strains(case: Case, outputs: Iterable[str], truth: bool) -> None:
     normal = across(axis, [figures[n]["normal"] for n in states])
     grids = {n: grid_of(read_columns(case.path(f"cells_state{n}.csv"))) for n in states}
     rows = -(-len(states) // ACROSS)
-    fig = style.figure(66 + 74 * rows)
-    top, bottom = fig.subfigures(2, 1, height_ratios=[74 * rows, 66])
+    fig = style.figure(66 + 80 * rows)
+    top, bottom = fig.subfigures(2, 1, height_ratios=[80 * rows, 66])
     maps(top, case, grids, figures, (axis, normal))
     left, right = bottom.subplots(1, 2, width_ratios=[1.3, 1])
     profiles(left, case, grids, truth)
@@ -70,7 +70,8 @@ def maps(fig: Figure, case: Case, grids: dict, figures: dict, way: tuple[int, in
         band_line(ax, figures[state], (flat, axis, normal), lines)
         ax.set(xlabel=f"{style.AXES[flat]} (voxels)\n{band_words(figures[state])}")
         ax.set(ylabel=f"{style.AXES[axis]} (voxels), loading" if number % width == 0 else "")
-        style.headline(ax, case.title(state, case.micro[0]).replace(": ", ":\n"), number)
+        title = case.title(state, case.micro[0]).replace(": ", ":\n").replace(", ", ",\n")
+        style.headline(ax, title, number)
     label = "strain along the axis\nover its mean (–)"
     style.colour_bar(fig, list(axes), RANGE, style.MAGNITUDE, label, shrink=0.8)
 
