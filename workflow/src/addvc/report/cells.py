@@ -29,8 +29,8 @@ def cell_strains(case: Case, outputs: Iterable[str], truth: bool) -> None:
     normal = across(axis, [figures[n]["normal"] for n in states])
     grids = {n: grid_of(read_columns(case.path(f"cells_state{n}.csv"))) for n in states}
     rows = -(-len(states) // ACROSS)
-    fig = style.figure(66 + 74 * rows)
-    top, bottom = fig.subfigures(2, 1, height_ratios=[74 * rows, 66])
+    fig = style.figure(66 + 80 * rows)
+    top, bottom = fig.subfigures(2, 1, height_ratios=[80 * rows, 66])
     maps(top, case, grids, figures, (axis, normal))
     left, right = bottom.subplots(1, 2, width_ratios=[1.3, 1])
     profiles(left, case, grids, truth)
