@@ -136,3 +136,14 @@ def test_quadrature_of_clear_voxels_is_a_part_of_all(rng, box):
     clear = clear_voxels(image, 1, 8.0)[tuple(every.points.astype(int).T)]
     assert_array_equal(some.points, every.points[clear])
     assert_array_equal(some.shape, every.shape[clear])
+
+
+def test_nodes_in_the_void_do_not_make_the_coarsest_mesh_singular(rng, box):
+    """No clear voxel is near the far corner of the mesh, and no Laplacian is asked for."""
+    image = rng.normal(20, 2, (60, 40, 40)).astype(np.float32)
+    image[6:20, ::8] += 100
+    mesh = box((5, 5, 5), (54, 34, 34), (7, 3, 3))
+    system = meso_system(mesh, image, MesoOptions(AXIS, 0.0, 40.0, clear=8.0))
+    assert (system.reference.quadrature.points[:, 0] < 30).all()
+    load = rng.normal(size=mesh.points.size)
+    assert np.isfinite(system.factor.solve(load)).all()

@@ -4,11 +4,12 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 from snakemake.utils import validate
 
 from addvc.images.hashes import content_hash
 from addvc.provenance import commit
-from addvc.report.methods import REFERENCES, Citations, listing, methods, span
+from addvc.report.methods import REFERENCES, STARTS, Citations, listing, methods, span
 
 ROOT = Path(__file__).parents[2]
 MESH = {"nodes": 71416, "cells": 239573, "mean_edge": 12.34, "mean_volume": 0.117,
@@ -110,3 +111,11 @@ def test_the_hash_is_that_of_the_bytes(tmp_path):
 def test_the_commit_is_known_in_a_repository_only(tmp_path):
     assert commit(tmp_path) == "unknown"
     assert re.fullmatch(r"[0-9a-f]{40}(-dirty)?|unknown", commit())
+
+
+def test_every_start_of_the_schema_has_its_words():
+    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    names = schema["properties"]["meso"]["properties"]["candidates"]["items"]["enum"]
+    text = told(config() | {"meso": config()["meso"] | {"candidates": names}})
+    assert "the motion of the platens" in text
+    assert set(names) == set(STARTS)

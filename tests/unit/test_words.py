@@ -37,6 +37,7 @@ def found(converged=True, valid=1.0, error=ERROR):
     """What is said of one mesh in one state."""
     return {
         "converged": converged,
+        "start": "meso23",
         "iterations": 4 if converged else 40,
         "last_step": 4.2e-4 if converged else 0.31,
         "residual_std": 0.56,

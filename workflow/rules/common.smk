@@ -115,7 +115,10 @@ def scan_input(state):
 
 
 def fields_of(wildcards):
-    """Candidates of a state that are defined everywhere, so that any mesh may start from them."""
+    """Candidates of a state that are defined everywhere, so that any mesh may start from them; the one
+    of the wildcard `field` alone, where there is one."""
+    if "field" in wildcards.keys():
+        return [wildcards.field]
     later = EARLIER if int(wildcards.state) > 1 else []
     return [
         name for name in config["meso"]["candidates"] if name in ["freeform", *later]

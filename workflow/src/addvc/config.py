@@ -77,6 +77,12 @@ def check_given(config: dict) -> list[str]:
     """Warnings about real scans; ConfigError when they come without their porosity."""
     if "scans" not in config:
         return []
+    platens = config["scans"].get("platens", "auto")
+    if platens == "none" and "extrapolated" in config.get("meso", {}).get("candidates", []):
+        raise ConfigError(
+            "scans.platens is none, and `extrapolated` needs the motion of the platens: leave it out of "
+            "meso.candidates, or say where the platens are"
+        )
     if "porosity" not in config:
         raise ConfigError(
             "`porosity` is missing: give the share of void of your material, which "

@@ -111,10 +111,11 @@ def state_figures(
 def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
     """Convergence, residual, validity and, with a truth, the error of one mesh in one state."""
     name = f"{mesh}_state{state}"
-    solution, _ = load_solution(folder / f"dvc/{name}.h5")
+    solution, notes = load_solution(folder / f"dvc/{name}.h5")
     residual = read_json(folder / f"analysis/residual_{name}.json")
     _, _, point, _ = read_vtu(folder / f"fields/{name}.vtu")
     return {
+        "start": notes.get("best"),
         "converged": solution.converged,
         "iterations": solution.iterations,
         "last_step": solution.history[-1],

@@ -10,6 +10,7 @@ import logging
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import sparse
 
 from addvc.correlation.clear import clear_voxels
 from addvc.correlation.gauss_newton import Solution, gauss_newton
@@ -26,6 +27,7 @@ from addvc.correlation.register import Stop, System, register
 from addvc.correlation.regularisation import diffusion
 from addvc.fem.assembly import node_pattern
 from addvc.fem.mesh import Mesh
+from addvc.fem.operators import laplacian, vectorised
 from addvc.fem.quadrature import Quadrature, lattice_points, voxel_points
 from addvc.fem.solver import factorise
 from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to_coarse
@@ -33,6 +35,7 @@ from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to
 log = logging.getLogger(__name__)
 
 TRIAL = Stop(1e-3, 10)  # of a candidate start
+HOLD = 1e-6  # of the diagonal of H
 START_VOXELS = 2e6  # a start is coarse: more voxels would take memory and give nothing
 
 
@@ -95,9 +98,15 @@ def meso_system(
     reference = reference_on(mesh, quadrature, coefficients)
     h = hessian(reference, node_pattern(mesh))
     if options.cutoff == 0:
-        return System(reference, None, factorise(h))
+        return System(reference, None, factorise(h + held(mesh, h)))
     extra = diffusion(mesh, h, options.cutoff, options.period, options.axis)
     return System(reference, extra, factorise(h + extra))
+
+
+def held(mesh: Mesh, h: sparse.bsr_matrix) -> sparse.spmatrix:
+    """A Laplacian so weak that it only holds the nodes with no voxel that counts around them."""
+    operator = vectorised(laplacian(mesh))
+    return operator * (HOLD * h.diagonal().mean() / operator.diagonal().mean())
 
 
 def pyramid_start(

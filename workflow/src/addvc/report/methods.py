@@ -41,6 +41,9 @@ STARTS = {
     "zero": "no displacement",
     "platens": "a coarse grid that holds the platens",
     "freeform": "a free-form displacement on cubic B-splines {freeform}",
+    "previous": "the displacement of the state before",
+    "extrapolated": "that of the state before, scaled by the motion of the platens",
+    "composed": "that of the state before, followed by a free-form displacement between the two states",
 }
 
 
@@ -109,10 +112,14 @@ def meso(summary: dict, config: dict) -> str:
     meshes = [m for name, m in summary["meshes"].items() if not name.startswith("micro")]
     edges = listing([f"{mesh['mean_edge']:.1f}" for mesh in meshes])
     starts = listing([STARTS[c] for c in config["meso"]["candidates"]], "or")
+    least, more = config["meso"]["clear"], set(config["meso"]["candidates"]) - {"zero", "platens"}
+    clear = f", on the voxels whose gradient exceeds {least:g} times its noise" if least else ""
+    fields = " or from one of these that is defined everywhere" if more else ""
     return (
         "Each loading state was registered with the reference by finite-element DVC {dvc} on "
-        f"tetrahedra with a mean edge of {edges} voxels, coarse to fine, from the start of least "
-        f"residual: {starts}, each rescaled in a reduced basis {{addvc}}."
+        f"tetrahedra with a mean edge of {edges} voxels, coarse to fine{clear}, from the start of least "
+        f"residual: {starts}, each rescaled in a reduced basis on the coarsest mesh {{addvc}}; finer "
+        f"meshes and micro DVC started from the coarser result{fields}."
     )
 
 

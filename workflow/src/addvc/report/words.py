@@ -279,7 +279,7 @@ def convergence_table(summary: dict) -> list[str]:
     rows = [
         [
             state["label"],
-            state["micro_start" if mesh.startswith("micro") else "start"],
+            state["micro_start"] if mesh.startswith("micro") else state[mesh]["start"],
             mesh,
             str(state[mesh]["iterations"]),
             figure(state[mesh]["last_step"], ".1e"),
