@@ -1,6 +1,8 @@
 """Figures: what is read, cut out, projected and written, on small meshes; no stored pictures."""
 
 import csv
+import html
+import re
 
 import h5py
 import matplotlib.pyplot as plt
@@ -268,6 +270,18 @@ def test_acquisition_has_units_in_its_header(case, folder, tmp_path):
     assert rows["Number of scans"]["Value"] == "3 (1 reference + 2 loadings)"
     assert float(rows["Memory size of one scan"]["Value"]) == pytest.approx(6.967, abs=1e-3)
     assert rows["Noise"] == {"Parameter": "Noise", "Value": "4", "Unit": "grey level"}
+
+
+def rows_of(page):
+    """The cells of a table of a page."""
+    rows = re.findall(r"<tr>(.*?)</tr>", page, re.S)
+    return [[html.unescape(c) for c in re.findall(r"<t[hd]>(.*?)</t[hd]>", row)] for row in rows]
+
+
+def test_a_table_is_a_page_too(tmp_path):
+    tables.write_table(tmp_path / "t.html", [["a", "b (–)"], ["x < y & z", "1.5"], ["", "2"]])
+    found = rows_of((tmp_path / "t.html").read_text(encoding="utf-8"))
+    assert found == [["a", "b (–)"], ["x < y & z", "1.5"], ["", "2"]]
 
 
 def test_mesh_without_cells_in_the_box_is_empty(cube):

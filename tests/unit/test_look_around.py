@@ -51,6 +51,8 @@ def case(tmp_path, bar):
             write_vtu(tmp_path / f"fields/{name}_state{state}.vtu", bar.points, bar.cells,
                       {"displacement": u, "valid": np.ones(len(u), np.uint8)},
                       {"strain_norm": np.full(len(bar.cells), -state * SLOPE)})  # fmt: skip
+        foam = {"micro": {"valid": 1, "flagged": 1}}
+        write_json(tmp_path / f"struts_state{state}.json", {"foam": foam})
         write_columns(tmp_path / f"struts_state{state}.csv",
                       {"valid": [1, 0], "bending_share": [0.75, 0.5]})  # fmt: skip
     labels = {1: "5 %", 2: "10 %"}

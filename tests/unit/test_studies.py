@@ -89,7 +89,8 @@ def test_the_state_is_the_third_or_the_last():
     asked = CONFIG | {"sensitivity": CONFIG["sensitivity"] | {"state": 4}}
     assert studies.studied_state(asked, [1, 2, 3, 4]) == 4
     with pytest.raises(ConfigError, match="state is 4, but there are 2"):
-        studies.studied_state(asked, [1, 2])
+        studies.check(asked, [1, 2])
+    studies.check(asked, [])  # the reference alone
 
 
 def test_seminorms_vanish_in_a_rigid_motion_and_are_one_for_the_wave(box):
@@ -119,7 +120,8 @@ def test_a_stretch_has_its_own_elastic_strain(box):
 def row(v, state, error):
     return vars(v) | {
         "state": state, "settings": {p: 2.0 * v.factor for p in studies.PARAMETERS},
-        "nodes": 10, "cells": 20, "iterations": 4, "converged": v.factor != 2, "seconds": 1.0,
+        "nodes": 10, "cells": 20, "kept": 0.9, "iterations": 4,
+        "converged": v.factor != 2, "seconds": 1.0,
         "residual_std": 3.0 / v.factor if v.factor else None, "flagged": 0.0, "error": error,
         "seminorms": {"l_k": 1.0 + v.factor, "l_l": None, "l_e": 0.1},
     }  # fmt: skip

@@ -18,7 +18,7 @@ from addvc.analysis.topology import (
 )
 from addvc.fem.mesh import cell_volumes, check_mesh
 from addvc.fem.rotations import nearest_rotation
-from addvc.geometry.skeleton import FREE_END, strut_graph
+from addvc.geometry.skeleton import FREE_END, StrutGraph, strut_graph
 from addvc.geometry.stubs import dangling_stubs, pruned
 from addvc.geometry.stuffing import stuff
 from addvc.images.files import write_json
@@ -87,6 +87,9 @@ def test_pruning_a_mesh_without_stubs_changes_nothing(frame):
     rest, count = pruned(mesh, graph, np.ones(len(mesh.points), bool))
     assert count == 0
     np.testing.assert_array_equal(rest.cells, mesh.cells)
+    nothing = StrutGraph(np.zeros((0, 3)), np.zeros(0), [])
+    assert pruned(mesh, nothing, np.zeros(len(mesh.points), bool)) == (mesh, 0)
+    assert contacts(mesh, mesh_edges(mesh), nothing) == []
 
 
 def strut(area, ends=(0, 1)):

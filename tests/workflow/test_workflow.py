@@ -185,6 +185,20 @@ def test_the_twin_is_what_it_claims_to_be(results, summary):
     assert len(checks) >= 8 + 3 * len(STATES)  # geometry and mechanics; then each state
 
 
+def test_the_topology_of_the_mesh_is_counted_where_it_is_listed(results, summary):
+    found = json.loads((results / "geometry/topology.json").read_text())
+    assert summary["topology"] == found["counts"]
+    assert found["counts"]["stubs"] == len(found["stubs"])
+    assert found["counts"]["contacts"] == len(found["contacts"])
+
+
+def test_studies_start_from_what_the_main_run_has_made(place, run):
+    rules = started(snakemake(place, "ablation", "sensitivity", "--dry-run").stdout)
+    assert {"variant_dvc", "variant", "more_ablation", "more_sensitivity"} <= rules
+    own = {"varied_threshold", "ablation", "sensitivity", "more_ablation", "more_sensitivity"}
+    assert {name for name in rules - own if not name.startswith("variant")} == set()
+
+
 def test_the_twin_is_measured_as_it_was_made(summary):
     assert summary["case"] == "test"
     assert summary["cell_size"] == pytest.approx(28, rel=0.1)

@@ -29,6 +29,7 @@ def checked_config(config):
         validate(config, str(SCHEMA))
         settings.meso_names(config)
         settings.truth_file(config)
+        studies.check(config, list(settings.state_labels(config)))
         paths = (
             [config["scans"]["reference"], *config["scans"]["states"]]
             if "scans" in config

@@ -11,6 +11,7 @@ CHAPTERS = {  # the order of the paper, then what is beyond it; snakemake sorts 
     "Struts": "6 Beyond the paper: struts",
     "Quality": "7 Beyond the paper: quality",
     "Synthetic test": "8 Beyond the paper: the synthetic test",
+    "Studies": "9 Beyond the paper: studies",
 }
 SPECIMEN = [f"{R}/geometry/specimen.json", f"{R}/geometry/threshold.json"]
 
@@ -82,21 +83,28 @@ def cells():
 
 
 def shown(name, number, category, shows):
-    """A figure of the report and of the list of all figures, with its caption.
+    """A figure or table of the report and of the list of all figures."""
+    files = entry(name, number, category, shows)
+    FIGURES.extend(map(str, files))
+    return files
 
-    One label only: of a chapter with two figures snakemake's report would make a switch of the second
-    label, and fail on it."""
-    FIGURES.append(f"{R}/figures/{name}")
-    caption = f"../report/{number}.rst"
+
+def entry(name, number, category, shows):
+    """The files of a figure or table, the last with its place in the report and its caption.
+
+    A table is a CSV, and a page (.html) that the report shows. One label only: of a chapter with two
+    figures snakemake's report would make a switch of the second label, and fail on it.
+    """
+    page = name.replace(".csv", ".html")
     words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
     words = words.replace("table", "Table ") + ": "
-    name = shows if number.startswith("more") else words + shows
-    return report(
-        FIGURES[-1],
+    found = report(
+        f"{R}/figures/{page}",
         category=CHAPTERS[category],
-        caption=caption,
-        labels={"figure": name},
+        caption=f"../report/{number}.rst",
+        labels={"figure": shows if number.startswith("more") else words + shows},
     )
+    return [found] if page == name else [f"{R}/figures/{name}", found]
 
 
 def drawing(name):

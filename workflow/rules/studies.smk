@@ -54,12 +54,7 @@ if STATES:
 
     def of_study(name, shows):
         """A figure or table of a study, with its caption."""
-        return report(
-            f"{R}/figures/{name}",
-            category="Studies",
-            caption=f"../report/{Path(name).stem}.rst",
-            labels={"figure": Path(name).stem.replace("more_", ""), "shows": shows},
-        )
+        return entry(name, Path(name).stem, "Studies", shows)
 
     def starts_on_variant(wildcards):
         """The candidate starts of micro DVC at the nodes of a variant's mesh."""
@@ -269,6 +264,7 @@ if STATES:
         input:
             **({"error": given("error")} if HAS_TRUTH else {}),
             mesh=given("classes"),
+            figures=given("figures"),
             threshold=given("threshold"),
             cell_size=f"{R}/geometry/cell_size.json",
             solution=given("solution"),

@@ -2,10 +2,10 @@
 
 from addvc.report.case import Case
 from addvc.report.struts_truth import against_truth, truth_rows
-from addvc.report.tables import write_table
+from addvc.report.tables import write_tables
 from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)
-    write_table(snakemake.output.table, truth_rows(case))
+    write_tables(snakemake.output.table, truth_rows(case))
     against_truth(case, snakemake.output.pictures)

@@ -2,11 +2,11 @@
 
 from addvc.images.files import read_json
 from addvc.report.studies import ablation, ablation_rows
-from addvc.report.tables import write_table
+from addvc.report.tables import write_tables
 from addvc.runtime import job
 
 with job(snakemake):
     found = [read_json(path) for path in snakemake.input]
     labels = {int(state): label for state, label in snakemake.params.labels.items()}
-    write_table(snakemake.output.table, ablation_rows(found, labels))
+    write_tables(snakemake.output.table, ablation_rows(found, labels))
     ablation(found, labels, snakemake.output.pictures)

@@ -2,10 +2,10 @@
 
 from addvc.images.files import read_json
 from addvc.report.studies import sensitivity, sensitivity_rows
-from addvc.report.tables import write_table
+from addvc.report.tables import write_tables
 from addvc.runtime import job
 
 with job(snakemake):
     found = [read_json(path) for path in snakemake.input]
-    write_table(snakemake.output.table, sensitivity_rows(found))
+    write_tables(snakemake.output.table, sensitivity_rows(found))
     sensitivity(found, snakemake.params.label, snakemake.output.pictures)

@@ -19,6 +19,8 @@ with job(snakemake) as log:
     solution, residual = load_solution(source.solution)[0], load_residual(source.residual)
     mesh, penalised = Mesh(points, cells), classes["penalised"] > 0
     row |= variant_figures(mesh, penalised, options, solution, residual, levels["noise"])
+    figures = read_json(source.figures)
+    row["kept"] = figures["kept_fraction"] * figures["voxel_kept_fraction"]
     row["error"] = read_json(source.error) if source.get("error") else None
     log.info("%s", row)
     write_json(snakemake.output[0], row)

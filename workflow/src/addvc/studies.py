@@ -120,6 +120,13 @@ def sensitivity(config: dict) -> list[Variant]:
     return found
 
 
+def check(config: dict, states: list[int]) -> None:
+    """ConfigError where the `sensitivity` section asks for what is not there."""
+    sensitivity(config)
+    if states:
+        studied_state(config, states)
+
+
 def studied_state(config: dict, states: list[int]) -> int:
     """The loading state of the sensitivity study; ConfigError when there is no such state."""
     wanted = config["sensitivity"]["state"]

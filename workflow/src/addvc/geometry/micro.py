@@ -25,11 +25,7 @@ def micro_mesh(
     `options` is the `mesh` section of the configuration; `mend: prune` cuts dangling stubs off.
     Raises MeshError when the largest piece holds less than `min_kept` of the volume, or a cell is
     inverted or too flat."""
-    if options["backend"] == "pytetwild":
-        small = remeshed(surface, options["size"])
-        mesh = tetrahedralise(small, TetOptions(options["size"]))
-    else:
-        mesh = stuff(grey, gamma, options["size"])
+    mesh = meshed(grey, gamma, surface, options)
     whole = np.abs(cell_volumes(mesh)).sum() if len(mesh.cells) else 0.0
     if whole == 0:
         raise MeshError(
@@ -48,6 +44,13 @@ def micro_mesh(
     figures |= surface_distance(mesh, surface)
     report(figures, options)
     return mesh, figures
+
+
+def meshed(grey: np.ndarray, gamma: float, surface: Surface, options: dict) -> Mesh:
+    """Tetrahedra of {grey > gamma} by `backend`, in any number of pieces."""
+    if options["backend"] == "pytetwild":
+        return tetrahedralise(remeshed(surface, options["size"]), TetOptions(options["size"]))
+    return stuff(grey, gamma, options["size"])
 
 
 def surface_distance(mesh: Mesh, surface: Surface) -> dict:

@@ -53,6 +53,8 @@ def pruned(mesh: Mesh, graph: StrutGraph, cut: np.ndarray) -> tuple[Mesh, int]:
 
     Of a stub goes what is nearer to its line than to any other, beyond the ball of its junction."""
     stubs = stub_branches(graph, mesh, cut)
+    if not stubs:
+        return mesh, 0
     centre = mesh.points[mesh.cells].mean(axis=1)
     owned = nearest_line([resampled(branch.points) for branch in graph.branches], centre)
     keep = np.ones(len(mesh.cells), dtype=bool)

@@ -15,6 +15,9 @@ from addvc.report.case import Case
 RANGE = Normalize(0, 2.5)
 """Of the strain over its mean."""
 
+ACROSS = 4
+"""Maps in a row, at most."""
+
 BAND = "#ffffff"
 
 
@@ -25,8 +28,9 @@ def cell_strains(case: Case, outputs: Iterable[str], truth: bool) -> None:
     figures = {n: case.json(f"cells_state{n}.json")["localisation"] for n in states}
     normal = across(axis, [figures[n]["normal"] for n in states])
     grids = {n: grid_of(read_columns(case.path(f"cells_state{n}.csv"))) for n in states}
-    fig = style.figure(140)
-    top, bottom = fig.subfigures(2, 1, height_ratios=[1.1, 1])
+    rows = -(-len(states) // ACROSS)
+    fig = style.figure(66 + 80 * rows)
+    top, bottom = fig.subfigures(2, 1, height_ratios=[80 * rows, 66])
     maps(top, case, grids, figures, (axis, normal))
     left, right = bottom.subplots(1, 2, width_ratios=[1.3, 1])
     profiles(left, case, grids, truth)
@@ -54,16 +58,20 @@ def maps(fig: Figure, case: Case, grids: dict, figures: dict, way: tuple[int, in
     """A panel a state, the loading axis up, seen along `way[1]`, in the middle."""
     axis, normal = way
     flat = 3 - axis - normal
-    axes = fig.subplots(1, len(grids), squeeze=False, sharey=True)[0]
-    for number, (ax, (state, (lines, strain))) in enumerate(zip(axes, grids.items(), strict=True)):
+    width = min(len(grids), ACROSS)
+    axes = fig.subplots(-(-len(grids) // width), width, squeeze=False, sharey=True).ravel()
+    for ax in axes[len(grids) :]:
+        ax.set_axis_off()
+    for number, (ax, (state, (lines, strain))) in enumerate(zip(axes, grids.items(), strict=False)):
         ratio = strain / (np.nanmean(strain) or np.nan)
         part = np.take(ratio, len(lines[normal]) // 2, axis=normal)
         part = part if axis < flat else part.T  # rows along the loading axis
         draw_map(ax, part, lines[flat], lines[axis])
         band_line(ax, figures[state], (flat, axis, normal), lines)
         ax.set(xlabel=f"{style.AXES[flat]} (voxels)\n{band_words(figures[state])}")
-        ax.set(ylabel=f"{style.AXES[axis]} (voxels), loading" if number == 0 else "")
-        style.headline(ax, case.title(state, case.micro[0]).replace(": ", ":\n"), number)
+        ax.set(ylabel=f"{style.AXES[axis]} (voxels), loading" if number % width == 0 else "")
+        title = case.title(state, case.micro[0]).replace(": ", ":\n").replace(", ", ",\n")
+        style.headline(ax, title, number)
     label = "strain along the axis\nover its mean (–)"
     style.colour_bar(fig, list(axes), RANGE, style.MAGNITUDE, label, shrink=0.8)
 
@@ -102,7 +110,7 @@ def band_words(band: dict) -> str:
     if not band["bands"]:
         return "no band\n\n\n"
     return (
-        f"band: {band['band_volume_share']:.0%} of volume,\n"
+        f"band: {band['band_volume_share']:.0%} volume,\n"
         f"{band['band_strain_share']:.0%} of strain,\n"
         f"{band['thickness']:.0f} voxels thick, {band['angle']:.0f}°"
     )
@@ -146,4 +154,5 @@ def shares(ax: Axes, case: Case, figures: dict, truth: bool) -> None:
             ax.plot(x, y, "o", color=style.DARK, ms=4, label="truth" if shift > 0 else None)
     ax.set(xticks=range(len(figures)), xlabel="loading state", ylabel="share in bands (%)")
     ax.set_xticklabels([case.labels[n] for n in figures])
+    ax.set_ylim(top=1.35 * ax.get_ylim()[1])
     ax.legend(fontsize=7, loc="upper left")

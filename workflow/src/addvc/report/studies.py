@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from addvc.report import style
 
@@ -13,7 +13,7 @@ NAMES = {
     "l_k": ("$l_K$", "voxel"),
     "l_l": ("$l_L$", "voxel"),
     "l_e": ("$l_E$", "voxel"),
-    "nu": ("Poisson's ratio", "–"),
+    "nu": (r"$\nu$", "–"),
     "threshold": ("threshold", "grey level"),
     "size": ("mesh size", "voxel"),
 }
@@ -64,13 +64,15 @@ def ablation_rows(found: Sequence[dict], labels: dict[int, str]) -> list[list[st
 def sensitivity_rows(found: Sequence[dict]) -> list[list[str]]:
     """A row for each value of each parameter."""
     names, judged = header(found)
-    rows = [["Parameter", "Unit", "Value", "Times", "Method", "Nodes", *names, "Seminorm"]]
+    rows = [["Parameter", "Unit", "Value", "Times", "Method", "Nodes", "Solid kept (–)",
+             *names, "Seminorm"]]  # fmt: skip
     for r in found:
         name = r["parameter"]
         norm = r["seminorms"].get(name)
         rows.append([
             name, NAMES[name][1], f"{r['settings'][name]:.4g}", f"{r['factor']:g}", r["method"],
-            str(r["nodes"]), *figures(r, judged), "–" if norm is None else f"{norm:.4g}",
+            str(r["nodes"]), f"{r['kept']:.3f}", *figures(r, judged),
+            "–" if norm is None else f"{norm:.4g}",
         ])  # fmt: skip
     return rows
 
@@ -94,13 +96,7 @@ def ablation(found: Sequence[dict], labels: dict[int, str], outputs: Iterable[st
             _mark(ax, states.index(row["state"]) + 0.75 * place, row, name, methods)
         style.headline(ax, name, number)
         ax.set_xticks(range(len(states)), [labels[state] for state in states])
-        ax.set_xlabel("loading state")
-        if not name.startswith("nodes"):
-            ax.set_yscale("log")
-            ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            ax.yaxis.set_minor_formatter("")
-        ax.yaxis.set_major_formatter("{x:g}")
-        ax.grid(axis="y", lw=0.3, color="#dddddd")
+        _scale(ax, logarithmic=not name.startswith("nodes"))
     handles = [
         style.line(style.SERIES[n % 6], method.replace("_", " "), "", style.MARKERS[n % 6])
         for n, method in enumerate(methods)
@@ -109,6 +105,17 @@ def ablation(found: Sequence[dict], labels: dict[int, str], outputs: Iterable[st
     handles.append(style.line(style.RED, "not converged", "", "x"))
     fig.legend(handles=handles, loc="outside lower center", ncols=4)
     style.save(fig, outputs)
+
+
+def _scale(ax: Axes, logarithmic: bool) -> None:
+    """Axes of a panel of the ablation."""
+    ax.set_xlabel("loading state")
+    if logarithmic:
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.yaxis.set_minor_formatter("")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.grid(axis="y", lw=0.3, color="#dddddd")
 
 
 def _quantities(judged: bool) -> list[str]:
@@ -170,6 +177,12 @@ def _l_curve(ax: Axes, rows: list[dict], name: str, number: int) -> None:
         ax.annotate(f"{row['settings'][name]:.3g}", (a, b), (4, 4), textcoords="offset points",
                     fontsize=7)  # fmt: skip
     ax.margins(0.16)
+    low, high = ax.get_ylim()
+    least = 0.1 * abs(high)  # so that nothing does not look like something
+    if high - low < least:
+        ax.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+    ax.ticklabel_format(axis="y", useOffset=False)
+    ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.set(xlabel=SEMINORMS[name], ylabel="σ(r) (grey levels)")
     style.headline(ax, f"L-curve of {NAMES[name][0]} (voxels)", number)
 
@@ -188,14 +201,7 @@ def _columns(part: SubFigure, by_name: dict[str, list[dict]], judged: bool, firs
     axes = part.subplots(2 + judged, len(by_name), sharey="row", sharex="col", squeeze=False)
     for column, (name, rows) in enumerate(by_name.items()):
         x = [row["settings"][name] for row in rows]
-        series = [
-            {style.DARK: [known(row["residual_std"]) for row in rows]},
-            {style.DARK: [100 * row["flagged"] for row in rows]},
-        ]
-        if judged:
-            keys = {style.BLUE: "rms", style.ORANGE: "p95"}
-            series.append({c: [row["error"][key] for row in rows] for c, key in keys.items()})
-        for ax, curves in zip(axes[:, column], series, strict=True):
+        for ax, curves in zip(axes[:, column], _curves(rows, judged), strict=True):
             for colour, y in curves.items():
                 ax.plot(x, y, "-", color=colour, lw=0.9)
                 for row, a, b in zip(rows, x, y, strict=True):
@@ -208,6 +214,22 @@ def _columns(part: SubFigure, by_name: dict[str, list[dict]], judged: bool, firs
     names = ["σ(r)\n(grey levels)", "nodes flagged\n(%)", "error\n(voxels)"]
     for ax, text in zip(axes[:, 0], names, strict=False):
         ax.set_ylabel(text)
+    _legend(part, judged)
+
+
+def _curves(rows: list[dict], judged: bool) -> list[dict[str, list[float]]]:
+    """Colour -> values, for each quantity."""
+    found = [
+        {style.DARK: [known(row["residual_std"]) for row in rows]},
+        {style.DARK: [100 * row["flagged"] for row in rows]},
+    ]
+    keys = {style.BLUE: "rms", style.ORANGE: "p95"}
+    errors = {c: [row["error"][key] for row in rows] for c, key in keys.items()} if judged else None
+    return [*found, errors] if judged else found
+
+
+def _legend(part: SubFigure, judged: bool) -> None:
+    """What lines and marks mean, below all columns."""
     handles = [style.line(style.BLUE, "rms"), style.line(style.ORANGE, "95th percentile")]
     handles = handles if judged else []
     handles.append(style.line(style.DARK, "value in use", "", "o"))

@@ -1,6 +1,7 @@
 """Tables 1 and 2 as CSV: the scans, and the parameters of every correlation."""
 
 import csv
+import html
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -21,10 +22,37 @@ TWIN = {
 }
 
 
+STYLE = """<style>
+  table { border-collapse: collapse; font: 14px/1.4 sans-serif; margin: 12px; }
+  th, td { text-align: left; padding: 4px 12px; border-bottom: 1px solid #ccc; }
+  th { position: sticky; top: 0; background: #fff; }
+</style>"""
+
+
 def write_table(path: str | Path, rows: Rows) -> None:
-    """CSV in UTF-8, the first row its header."""
+    """CSV in UTF-8 or, by the name, a page (.html); the first row is the header."""
+    if Path(path).suffix == ".html":
+        with atomic_path(path) as temporary:
+            temporary.write_text(page(rows), encoding="utf-8")
+        return
     with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
+
+
+def write_tables(outputs: Iterable[str | Path], rows: Rows) -> None:
+    """The same table under each name."""
+    for path in outputs:
+        write_table(path, rows)
+
+
+def page(rows: Rows) -> str:
+    """A table as a page for a browser."""
+    cells = [
+        "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in row)
+        for tag, row in zip(["th", *["td"] * (len(rows) - 1)], rows, strict=True)
+    ]
+    body = "\n".join(f"<tr>{line}</tr>" for line in cells)
+    return f'<!doctype html>\n<meta charset="utf-8">\n{STYLE}\n<table>\n{body}\n</table>\n'
 
 
 def acquisition(case: Case, outputs: Iterable[str], config: dict) -> None:

@@ -1,0 +1,59 @@
+"""Tables of README.md from a summary."""
+
+from pathlib import Path
+
+import pytest
+
+from addvc import readme
+from addvc.errors import AddvcError
+
+RESULT = {"converged": True, "error": {"rms": 0.0871, "p95": 0.1449}}
+SUMMARY = {
+    "meshes": {"meso12": {}, "micro": {}},
+    "states": [
+        {"label": "3.4 %", "meso12": RESULT, "micro": RESULT},
+        {
+            "label": "9 %",
+            "meso12": RESULT | {"converged": False},
+            "micro": RESULT | {"error": None},
+        },
+    ],
+    "cost": {
+        "twin_foam": {"cpu_s": 4.4, "max_rss_mb": 300.0},
+        "twin_scan": {"cpu_s": 5.0, "max_rss_mb": 310.0},
+        "micro_dvc": {"cpu_s": 90.0, "max_rss_mb": 900.0},
+        "struts": {"cpu_s": 3.0, "max_rss_mb": 200.0},
+    },
+}
+
+
+def test_errors_say_what_did_not_converge_and_what_is_not_known():
+    assert readme.accuracy(SUMMARY).splitlines()[2:] == [
+        "| `meso12` | 0.087 / 0.145 | 0.087 / 0.145, not converged |",
+        "| `micro` | 0.087 / 0.145 | – |",
+    ]
+
+
+def test_every_rule_is_in_one_stage():
+    lines = readme.cost(SUMMARY).splitlines()[2:]
+    seconds = [float(line.split("|")[2]) for line in lines]
+    assert [line.split("|")[1].strip() for line in lines] == [
+        "twin and its scans", "micro DVC, both methods", readme.REST]  # fmt: skip
+    assert sum(seconds) == pytest.approx(102.4, abs=1)
+
+
+def test_a_table_replaces_what_is_between_its_marks():
+    text = "a\n<!-- table cost -->\nold\n<!-- end -->\nb\n"
+    once = readme.filled(text, {"cost": "new"})
+    assert once == "a\n<!-- table cost -->\n\nnew\n\n<!-- end -->\nb\n"
+    assert readme.filled(once, {"cost": "new"}) == once
+
+
+def test_missing_marks_are_named():
+    with pytest.raises(AddvcError, match="no mark `<!-- table cost -->`"):
+        readme.filled("nothing", {"cost": "new"})
+
+
+def test_readme_has_the_marks():
+    text = (Path(__file__).parents[2] / "README.md").read_text()
+    readme.filled(text, {"accuracy": "", "cost": ""})
