@@ -56,13 +56,6 @@ def cost(folder: Path, result: str, state: int) -> float:
     )
 
 
-def cost_once(folder: Path) -> float:
-    """CPU seconds of meshes and factors, which all states share."""
-    return sum(
-        cpu_seconds(path) for rule in ONCE for path in folder.glob(f"benchmarks/{rule}/*.tsv")
-    )
-
-
 def targets(case: str, states: Iterable[int]) -> list[str]:
     """What the workflow must make of a case: the errors of all that is compared."""
     return [

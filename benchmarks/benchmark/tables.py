@@ -1,12 +1,11 @@
 """Tables as CSV, and the same in markdown between marks of README.md."""
 
 import csv
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from addvc.errors import AddvcError
 from addvc.images.files import atomic_path
+from addvc.readme import table, write_filled
 
 DIGITS = {"cpu_s": 0, "cpu_ratio": 2, "within_1_voxel": 4, "count": 0}
 """Decimal places of columns that differ from three."""
@@ -36,25 +35,10 @@ def write_csv(path: str | Path, rows: Sequence[dict], columns: Sequence[str]) ->
         table.writerows([text_of(key, row[key]) for key in columns] for row in rows)
 
 
-def markdown(path: str | Path) -> str:
-    """A CSV table as markdown."""
-    with Path(path).open(newline="") as file:
-        head, *rows = csv.reader(file)
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def fill(readme: str | Path, tables: Sequence[str | Path]) -> None:
-    """Put each table where README.md has `<!-- table STEM -->` ... `<!-- end -->`."""
-    text = Path(readme).read_text()
+    """Put each CSV table where README.md has `<!-- table STEM -->` ... `<!-- end -->`."""
+    found = {}
     for path in tables:
-        stem = Path(path).stem
-        pattern = re.compile(rf"(<!-- table {re.escape(stem)} -->\n).*?(<!-- end -->)", re.S)
-        if not pattern.search(text):
-            raise AddvcError(
-                f"{readme} has no mark `<!-- table {stem} -->`; add it and `<!-- end -->`"
-            )
-        table = markdown(path)
-        text = pattern.sub(lambda found, table=table: f"{found[1]}\n{table}\n\n{found[2]}", text)
-    with atomic_path(readme) as temporary:
-        temporary.write_text(text)
+        with Path(path).open(newline="") as file:
+            found[Path(path).stem] = table(list(csv.reader(file)))
+    write_filled(readme, found)

@@ -72,12 +72,17 @@ def filled(text: str, tables: dict[str, str]) -> str:
     return text
 
 
+def write_filled(readme: str | Path, tables: dict[str, str]) -> None:
+    """A file with its tables filled, in its place."""
+    text = filled(Path(readme).read_text(), tables)
+    with atomic_path(readme) as temporary:
+        temporary.write_text(text)
+
+
 def main(readme: str, summary: str) -> None:
     """Fill README.md."""
     figures = read_json(summary)
-    text = filled(Path(readme).read_text(), {"accuracy": accuracy(figures), "cost": cost(figures)})
-    with atomic_path(readme) as temporary:
-        temporary.write_text(text)
+    write_filled(readme, {"accuracy": accuracy(figures), "cost": cost(figures)})
 
 
 if __name__ == "__main__":
