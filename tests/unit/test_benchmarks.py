@@ -123,5 +123,5 @@ def test_tables_go_between_their_marks(tmp_path):
             "| meso 12 | 0.200 |\n| peer | 0.100 |\n\n<!-- end -->\nafter\n"
         )
     readme.write_text("no marks")
-    with pytest.raises(AddvcError, match="add it and"):
+    with pytest.raises(AddvcError, match="no mark `<!-- table peers -->`"):
         fill(readme, [table])
