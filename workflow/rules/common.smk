@@ -114,6 +114,13 @@ def scan_input(state):
     return [scan_path(state)] if own_scan(state) else SCAN_FILES[state]
 
 
+def grey_reference(wildcards):
+    """What the grey levels of a state are brought to, where they are."""
+    if config["images"]["grey"] == "none" or wildcards.state == "0":
+        return {}
+    return {"reference": f"{R}/volumes/volume0.h5"}
+
+
 def fields_of(wildcards):
     """Candidates of a state that are defined everywhere, so that any mesh may start from them; the one
     of the wildcard `field` alone, where there is one."""

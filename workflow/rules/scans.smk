@@ -76,7 +76,8 @@ rule volume:
 
 rule smooth:
     input:
-        f"{R}/volumes/volume{{state}}.h5",
+        unpack(grey_reference),
+        volume=f"{R}/volumes/volume{{state}}.h5",
     output:
         f"{R}/volumes/smooth{{state}}.h5",
     log:
@@ -92,6 +93,7 @@ rule smooth:
     params:
         code=code("scans/smooth.py"),
         images=config["images"],
+        axis=AXIS,
     script:
         "../scripts/scans/smooth.py"
 

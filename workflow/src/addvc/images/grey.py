@@ -1,0 +1,69 @@
+"""Brightness and contrast of a loading state brought to those of the reference, for scans that drift.
+
+Two levels are compared, those of void and of solid: the medians of the two classes that the intermeans
+threshold (Ridler & Calvard 1978) makes of the voxels between the platens. They do not depend on how
+many voxels are solid, which compression changes.
+"""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from skimage.filters import threshold_isodata
+
+from addvc.errors import ScanError
+from addvc.images.platens import find_platens
+
+log = logging.getLogger(__name__)
+
+MARGIN = 3  # voxels off the platens, whose faces are blurred
+LEAST = 0.2  # of the reference's contrast: less is no scan of the same foam
+SAMPLES = 2_000_000  # voxels that are enough for two medians
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Grey levels of void and solid."""
+
+    void: float
+    solid: float
+
+    @property
+    def contrast(self) -> float:
+        return self.solid - self.void
+
+
+def grey_levels(volume: np.ndarray, axis: int) -> Levels:
+    """Void and solid of a volume (nx, ny, nz), between its platens along `axis` where it shows any.
+
+    Raises ScanError when all grey levels are the same."""
+    faces = find_platens(volume, axis)
+    rows = np.moveaxis(volume, axis, 0)
+    if faces is not None:
+        rows = rows[int(np.ceil(faces[0])) + MARGIN : int(np.floor(faces[1])) + 1 - MARGIN]
+    grey = rows.ravel()[:: max(1, rows.size // SAMPLES)]
+    if grey.size == 0 or np.ptp(grey) == 0:
+        raise ScanError(
+            "the grey levels of a scan are all the same between its platens: images.grey cannot match "
+            "them; check the scan, or use images.grey: none"
+        )
+    middle = threshold_isodata(grey)
+    return Levels(float(np.median(grey[grey <= middle])), float(np.median(grey[grey > middle])))
+
+
+def matched(volume: np.ndarray, levels: Levels, wanted: Levels) -> np.ndarray:
+    """The volume with its two levels moved to those wanted: a I + b, float32.
+
+    Raises ScanError where the contrast is below a fifth of, or over five times, that wanted."""
+    ratio = levels.contrast / wanted.contrast
+    if not LEAST < ratio < 1 / LEAST:
+        raise ScanError(
+            f"the contrast of a state is {ratio:.2f} times that of the reference (from {LEAST} to "
+            f"{1 / LEAST:g} can be matched): check that both are scans of the same specimen"
+        )
+    log.info(
+        "grey levels: void %.1f, solid %.1f, contrast x %.3f", levels.void, levels.solid, ratio
+    )
+    return (
+        (volume - np.float32(levels.void)) / np.float32(ratio) + np.float32(wanted.void)
+    ).astype(np.float32)
