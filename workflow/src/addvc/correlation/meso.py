@@ -35,7 +35,7 @@ from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to
 log = logging.getLogger(__name__)
 
 TRIAL = Stop(1e-3, 10)  # of a candidate start
-HOLD = 1e-6  # of the diagonal of H
+HOLD = 1e-2  # of the diagonal of H
 START_VOXELS = 2e6  # a start is coarse: more voxels would take memory and give nothing
 
 
@@ -104,7 +104,10 @@ def meso_system(
 
 
 def held(mesh: Mesh, h: sparse.bsr_matrix) -> sparse.spmatrix:
-    """A Laplacian so weak that it only holds the nodes with no voxel that counts around them."""
+    """A Laplacian so weak that it only holds nodes with hardly a voxel that counts around them.
+
+    It moves meso 33 of the default twin by .002 voxel at 28.5 % and less before; with a ten-thousandth
+    of it the corners of a box of foam 96 voxels wide, which one strut touches, drift for 100 iterations."""
     operator = vectorised(laplacian(mesh))
     return operator * (HOLD * h.diagonal().mean() / operator.diagonal().mean())
 
