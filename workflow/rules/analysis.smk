@@ -392,6 +392,18 @@ rule cells:
         "../scripts/analysis/cells.py"
 
 
+# What the summary does not wait for, and whose cost it hence leaves out.
+APART = [
+    "scene",
+    "series",
+    "input_hashes",
+    "struts_truth",
+    "cells_truth",
+    "uncertainty_truth",
+    "difficulty",
+]
+
+
 rule summary:
     input:
         f"{R}/input.json",
@@ -448,10 +460,14 @@ rule summary:
         code=code("analysis/summary.py"),
         case=CASE,
         folder=lambda wildcards, output: str(Path(output[0]).parent),
-        meshes=[*MESO, *MICRO],
         states=LABELS,
-        finest=FINEST,
-        axis=AXIS,
-        truth=HAS_TRUTH,
+        scope={
+            "meshes": [*MESO, *MICRO],
+            "finest": FINEST,
+            "axis": AXIS,
+            "truth": HAS_TRUTH,
+            "freeform": bool(FREEFORM),
+            "apart": APART,
+        },
     script:
         "../scripts/analysis/summary.py"

@@ -1,13 +1,13 @@
 """The numbers of the whole case, in one file."""
 
-from addvc.analysis.summary import summarise, twin_checks
+from addvc.analysis.summary import Scope, summarise, twin_checks
 from addvc.images.files import write_json
 from addvc.provenance import commit
 from addvc.runtime import job
 
 with job(snakemake):
-    numbers = {key: value for key, value in snakemake.params.items() if key != "code"}
-    summary = summarise(**numbers)
+    params = snakemake.params
+    summary = summarise(params.case, params.folder, params.states, Scope(**params.scope))
     summary["twin_checks"] = twin_checks(snakemake.input.get("twin_check"))
     summary["versions"]["commit"] = commit()
     write_json(snakemake.output[0], summary)

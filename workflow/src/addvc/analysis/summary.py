@@ -2,6 +2,8 @@
 
 import csv
 import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -29,16 +31,22 @@ PACKAGES = (
 )
 
 
-def summarise(
-    case: str,
-    folder: str | Path,
-    meshes: list[str],
-    states: dict[int, str],
-    finest: str,
-    axis: int,
-    truth: bool,
-) -> dict:
-    """The summary of results/CASE (`folder`): `meshes` from meso to micro, `states` with labels."""
+@dataclass(frozen=True)
+class Scope:
+    """What there is to sum up: results from meso to micro, the finest meso mesh, the loading axis,
+    whether there is a truth and a free-form start, rules whose cost does not count since they may
+    run before or after."""
+
+    meshes: list[str]
+    finest: str
+    axis: int
+    truth: bool
+    freeform: bool
+    apart: list[str]
+
+
+def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scope) -> dict:
+    """The summary of results/CASE (`folder`) with the labels of its states."""
     folder = Path(folder)
     read = lambda name: read_json(folder / name)  # noqa: E731
     threshold, scans = read("geometry/threshold.json"), read("input.json")
@@ -50,13 +58,13 @@ def summarise(
         "noise": threshold["noise"],
         "uncertainty": read("analysis/uncertainty.json"),
         "voxel_size_um": scans["binned_voxel_size_um"],
-        "meshes": {mesh: mesh_figures(folder, mesh) for mesh in meshes},
+        "meshes": {mesh: mesh_figures(folder, mesh) for mesh in scope.meshes},
         "topology": read("geometry/topology.json")["counts"],
         "states": [
-            state_figures(folder, state, label, meshes, finest, axis, truth)
+            {"state": state, "label": label} | state_figures(folder, state, scope)
             for state, label in states.items()
         ],
-        "cost": costs(folder / "benchmarks"),
+        "cost": costs(folder / "benchmarks", scope.apart),
         "versions": {"addvc": __version__, "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
     }
@@ -81,14 +89,11 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
     }
 
 
-def state_figures(
-    folder: Path, state: int, label: str, meshes: list[str], finest: str, axis: int, truth: bool
-) -> dict:
+def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh."""
-    micro = next(mesh for mesh in meshes if mesh.startswith("micro"))
-    result = {"state": state, "label": label}
-    result |= {mesh: result_figures(folder, mesh, state, truth) for mesh in meshes}
-    points, _, point, _ = read_vtu(folder / f"fields/{finest}_state{state}.vtu")
+    micro, axis = next(mesh for mesh in scope.meshes if mesh.startswith("micro")), scope.axis
+    result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.meshes}
+    points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")
     trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
     strain = shortening(points[trusted, axis], point["displacement"][trusted, axis])
     best = result[micro]
@@ -100,7 +105,7 @@ def state_figures(
         "candidates": notes["candidates"],
         "micro_start": micro_notes["best"],
         "micro_candidates": micro_notes["candidates"],
-        "freeform": freeform_figures(folder, state, truth),
+        "freeform": freeform_figures(folder, state, scope.truth) if scope.freeform else None,
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
         "warp": read_json(folder / f"analysis/warp_state{state}.json"),
@@ -127,12 +132,9 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
     }
 
 
-def freeform_figures(folder: Path, state: int, truth: bool) -> dict | None:
-    """Convergence and, with a truth, the error of the free-form start; None where there is none."""
-    path = folder / f"dvc/freeform_state{state}.h5"
-    if not path.exists():
-        return None
-    solution, notes = load_solution(path)
+def freeform_figures(folder: Path, state: int, truth: bool) -> dict:
+    """Convergence and, with a truth, the error of the free-form start."""
+    solution, notes = load_solution(folder / f"dvc/freeform_state{state}.h5")
     error = folder / f"analysis/error_freeform_state{state}.json"
     return {
         "converged": solution.converged,
@@ -154,10 +156,10 @@ def shortening(position: np.ndarray, displacement: np.ndarray) -> float:
     return float(closer / (np.median(position[top]) - np.median(position[bottom])))
 
 
-def costs(folder: Path) -> dict:
+def costs(folder: Path, apart: Sequence[str] = ()) -> dict:
     """CPU seconds, wall seconds and peak memory of each rule, over its jobs, from benchmarks.
 
-    Figures are left out: they are drawn while this is read."""
+    Figures and the rules `apart` are left out: they may run while this is read."""
     result: dict[str, dict] = {}
     for path in sorted(set(folder.rglob("*.tsv")) - set(folder.glob("figures/*"))):
         with path.open() as file:
@@ -166,6 +168,8 @@ def costs(folder: Path) -> dict:
             continue
         number = {key: _number(row.get(key)) for key in ("cpu_time", "s", "max_rss")}
         rule = path.relative_to(folder).parts[0]
+        if rule in apart:
+            continue
         entry = result.setdefault(rule, {"jobs": 0, "cpu_s": 0.0, "wall_s": 0.0, "max_rss_mb": 0.0})
         entry["jobs"] += 1
         entry["cpu_s"] += number["cpu_time"]
