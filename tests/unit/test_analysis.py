@@ -274,17 +274,18 @@ HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\t
 
 
 def test_costs_add_up_over_the_jobs_of_a_rule(tmp_path):
-    """Figures are drawn while the summary is made: they do not count."""
+    """Figures are drawn while the summary is made: they do not count, nor do rules apart."""
     rows = {
         "meso_dvc/meso12_state1.tsv": "4.0\t0:00:04\t200.5\t1\t1\t1\t1\t1\t90\t3.5\n",
         "meso_dvc/meso12_state2.tsv": "6.0\t0:00:06\t300.5\t1\t1\t1\t1\t1\t90\t5.5\n",
         "summary/all.tsv": "0.4\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\tNA\tNA\n",
+        "scene/all.tsv": "8.0\t0:00:08\t500.0\t1\t1\t1\t1\t1\t90\t7.0\n",
         "figures/fig03.tsv": "8.0\t0:00:08\t500.0\t1\t1\t1\t1\t1\t90\t7.0\n",
     }
     for name, row in rows.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(HEAD + row)
-    assert costs(tmp_path) == {
+    assert costs(tmp_path, ["scene"]) == {
         "meso_dvc": {"jobs": 2, "cpu_s": 9.0, "wall_s": 10.0, "max_rss_mb": 300.5},
         "summary": {"jobs": 1, "cpu_s": 0.0, "wall_s": 0.4, "max_rss_mb": 0.0},
     }
