@@ -33,7 +33,8 @@ rule front_page:
 
 rule series:
     input:
-        fields(*RESULTS),
+        f"{R}/input.json",
+        fields=fields(*RESULTS),
     output:
         expand(f"{R}/fields/{{mesh}}.pvd", mesh=RESULTS),
     log:

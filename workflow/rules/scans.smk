@@ -30,7 +30,8 @@ rule check_input:
 
 rule input_hashes:
     input:
-        [scan_input(state) for state in [0, *STATES]],
+        f"{R}/input.json",
+        scans=[scan_input(state) for state in [0, *STATES]],
     output:
         f"{R}/input_hashes.json",
     log:
