@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from addvc.images.spline import (
     gaussian_blur,
+    gradient_length,
     interpolating_coefficients,
     spline_value,
     spline_value_gradient,
@@ -99,3 +100,11 @@ def test_number_of_threads_changes_nothing(noise, with_one_and_two_threads):
     results = with_one_and_two_threads(lambda: spline_value_gradient(noise, points(5000)))
     for one, two in zip(*results, strict=True):
         assert_array_equal(one, two)
+
+
+def test_gradient_at_all_voxel_centres_is_that_at_each(rng):
+    image = rng.normal(50, 20, (9, 12, 10)).astype(np.float32)
+    centres = np.argwhere(np.ones(image.shape, bool)).astype(float)
+    gradient = spline_value_gradient(image, centres)[1]
+    length = np.linalg.norm(gradient, axis=1).reshape(image.shape)
+    assert_allclose(gradient_length(image), length, rtol=1e-4, atol=1e-4)

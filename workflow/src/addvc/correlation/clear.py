@@ -7,7 +7,7 @@ meet other struts and pull the wrong way.
 import numpy as np
 
 from addvc.errors import CorrelationError
-from addvc.images.spline import spline_value_gradient
+from addvc.images.spline import gradient_length
 
 MAXWELL_MEDIAN = 1.538  # median length of a vector of three normal deviates of variance one
 STRONG = 99  # percentile of the gradients that stands for those of the structure
@@ -22,13 +22,8 @@ def clear_voxels(coefficients: np.ndarray, stride: int, clear: float) -> np.ndar
     The noise is that of the median voxel, which lies in the void. A quarter of the strong gradients
     is enough: in a texture, which has no void, most voxels take part. Raises CorrelationError for a
     blank image."""
-    lines = lattice(coefficients.shape, stride)
-    plane = np.stack(np.meshgrid(*lines[1:], indexing="ij"), axis=-1).reshape(-1, 2)
-    length = np.empty([len(line) for line in lines], np.float32)
-    for i, x in enumerate(lines[0]):  # plane by plane: all points at once would take gigabytes
-        points = np.column_stack([np.full(len(plane), x), plane])
-        gradient = spline_value_gradient(coefficients, points)[1]
-        length[i] = np.linalg.norm(gradient, axis=1).reshape(length[i].shape)
+    kept = (slice(stride // 2, None, stride),) * 3
+    length = gradient_length(coefficients)[kept]
     noise, strong = np.median(length) / MAXWELL_MEDIAN, np.percentile(length, STRONG)
     if strong <= BLANK * np.abs(coefficients).max():
         raise CorrelationError(

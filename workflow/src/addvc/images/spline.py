@@ -23,6 +23,20 @@ def gaussian_blur(volume: np.ndarray, sigma: float) -> np.ndarray:
     return ndimage.gaussian_filter(volume, sigma, output=np.float32, mode="nearest", truncate=4.0)
 
 
+def gradient_length(coefficients: np.ndarray) -> np.ndarray:
+    """Length of the gradient of the spline at all voxel centres (nx, ny, nz), float32, grey levels a
+    voxel: what `spline_value_gradient` gives there, axis by axis and so some ten times faster."""
+    value, slope = np.array([1, 4, 1]) / 6, np.array([-0.5, 0, 0.5])
+    square = np.zeros(coefficients.shape, np.float32)
+    for axis in range(3):
+        part = coefficients
+        for along in range(3):
+            weights = slope if along == axis else value
+            part = ndimage.correlate1d(part, weights, along, np.float32, mode="nearest")
+        square += np.square(part, out=part)
+    return np.sqrt(square, out=square)
+
+
 @nb.njit(inline="always")
 def _weights(t):
     s = 1.0 - t
