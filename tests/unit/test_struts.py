@@ -591,4 +591,4 @@ def test_figures_against_the_truth_become_rows_with_units(tmp_path):
     assert rows[0][4:] == [f"3.4 %: {verdicts[0]}", f"5.2 %: {verdicts[1]}"]
     found = next(row for row in rows if row[2] == "correlation of the share of bending")
     assert found[4:] == ["1", "1"]
-    assert next(row for row in rows if row[2] == "of these, flagged")[4:] == ["1", "1"]
+    assert next(row for row in rows if row[2] == "share of these that is flagged")[4:] == ["1", "1"]

@@ -22,8 +22,8 @@ QUANTITIES = {
 
 FLAGS = {
     "wrong": "struts in error by over 1 voxel",
-    "wrong_flagged": "of these, flagged",
-    "right_flagged": "of the others, flagged",
+    "wrong_flagged": "share of these that is flagged",
+    "right_flagged": "share of the others that is flagged",
 }
 
 
