@@ -140,7 +140,7 @@ def micro(summary: dict, config: dict) -> str:
         lead = " The displacement of its nodes minimises" if name == "micro" else " For comparison:"
         text += f"{lead} {functional(method, section, options)}, {wave} ({method})."
     first = section["methods"][0]
-    if section["mending"] and first != "eq10":
+    if section["mending"] and section["stages"] > 1 and first != "eq10":
         text += (
             " Struts whose residual stayed too large were carried by their neighbours and registered "
             f"again, at most {section['mending']} times."
@@ -178,6 +178,18 @@ def endings(summary: dict, method: str) -> str:
     return f"as that of {method} did in every state"
 
 
+def noise_words(summary: dict) -> str:
+    """The standard uncertainty by noise in voxels and micrometres, where it was made."""
+    found = summary.get("uncertainty")
+    if not found:
+        return ""
+    size = found["rms"] * summary["voxel_size_um"]
+    return (
+        f"By the noise of the images the standard uncertainty of the displacement of a node is "
+        f"{found['rms']:.3f} voxel ({size:.2g} micrometres, rms length of the vector). "
+    )
+
+
 def quality(summary: dict) -> str:
     """Residual, ultimate error, validity, and the error where a truth is known."""
     found = [state["micro"] for state in summary["states"]]
@@ -187,9 +199,10 @@ def quality(summary: dict) -> str:
     ultimate = summary["meshes"]["micro"]["ultimate_error"]
     valid = span([100 * one["valid_nodes"] for one in found], ".1f")
     text = (
-        f"The residual has a standard deviation of {span(residuals, '.2f')} grey levels; the error "
-        f"under a rigid sub-voxel shift {{limits}} is {ultimate:.1e} voxel. {valid} % of the nodes "
-        "have a residual that the noise of the images explains; the others are flagged."
+        f"The residual has a standard deviation of {span(residuals, '.2f')} grey levels. "
+        f"{noise_words(summary)}Interpolation alone, under a rigid sub-voxel shift without noise "
+        f"{{limits}}, gives {ultimate:.1e} voxel. {valid} % of the nodes have a residual that the noise "
+        "of the images explains; the others are flagged."
     )
     errors = [one["error"]["median"] for one in found if one["error"]]
     known = f" Against the known truth the median error is {span(errors or [0], '.3f')} voxel."

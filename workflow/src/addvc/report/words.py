@@ -202,7 +202,8 @@ def topology_warnings(counts: dict | None) -> list[str]:
     return [
         f"- The mesh of the struts has {', '.join(some)} (0 of each in a foam): see the figure of "
         "its topology, and geometry/topology.json for where. Elastic energy (`corotational`) holds "
-        "them; trust `eq10` least there. Lower images.blur or mesh.size, or change porosity."
+        "them, so its results can be used; trust `eq10` least there. For fewer of them, first lower "
+        "images.blur, then mesh.size; a porosity that is too high breaks struts too."
     ]
 
 
