@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from addvc.fem.mesh import Mesh
+from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, oblique, render
@@ -27,9 +27,15 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             layer = Layer(mesh.points + solution.u, faces, colour, edges=True, line_width=1.5)
             render([layer], view, 170 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
-            style.note(ax, f"σ(r) = {solution.residual['std']:.2f}")
+            style.note(ax, f"σ(r) = {solution.residual['std']:.2f}{_inverted(mesh, solution.u)}")
         style.row_name(axes[row, 0], name)
     style.save(fig, outputs)
+
+
+def _inverted(mesh: Mesh, u: np.ndarray) -> str:
+    """How many tetrahedra the displacement turns inside out, where it does."""
+    count = int((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).sum())
+    return f", {count} of {len(mesh.cells)} inverted" if count else ""
 
 
 def _reach(mesh: Mesh) -> np.ndarray:
