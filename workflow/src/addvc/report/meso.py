@@ -35,7 +35,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
 def _inverted(mesh: Mesh, u: np.ndarray) -> str:
     """How many tetrahedra the displacement turns inside out, where it does."""
     count = int((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).sum())
-    return f", {count} of {len(mesh.cells)} inverted" if count else ""
+    return f"\n{count} of {len(mesh.cells)} inverted" if count else ""
 
 
 def _reach(mesh: Mesh) -> np.ndarray:
