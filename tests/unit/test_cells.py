@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addvc.analysis.cell_strain import cell_strain, columns, nodal_volumes, window
+from addvc.analysis.cell_strain import cell_strain, columns, window
 from addvc.analysis.localisation import LEAST_STRAIN, compared, localisation
-from addvc.fem.mesh import cell_volumes
+from addvc.fem.mesh import cell_volumes, nodal_volumes
 from addvc.report.cells import across, grid_of, profile
 
 CELL = 10.0

@@ -127,9 +127,7 @@ rule meso_dvc:
         code=code("meso/meso_dvc.py"),
         meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
         coarsest=lambda wildcards: wildcards.meso == MESO[0],
-        coarser=lambda wildcards: (
-            "start" if wildcards.meso == MESO[0] else coarser(wildcards)
-        ),
+        coarser=coarser,
         names=lambda wildcards: (
             [] if wildcards.meso == MESO[0] else fields_of(wildcards)
         ),

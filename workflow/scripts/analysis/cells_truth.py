@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from addvc.analysis.cell_strain import cell_strain, columns, nodal_volumes
+from addvc.analysis.cell_strain import cell_strain, columns
 from addvc.analysis.localisation import compared, localisation
 from addvc.analysis.strut_store import read_columns, write_columns
 from addvc.analysis.truth import load_truth
 from addvc.fem.io import read_mesh
+from addvc.fem.mesh import nodal_volumes
 from addvc.images.files import read_json, write_json
 from addvc.runtime import job
 

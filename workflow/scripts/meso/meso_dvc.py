@@ -2,7 +2,7 @@
 
 from addvc.correlation.candidates import candidate, mesh_field
 from addvc.correlation.meso import chosen_register, meso_options, meso_system
-from addvc.correlation.store import save_solution
+from addvc.correlation.store import load_notes, save_solution
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.scans import load_volume
@@ -14,7 +14,8 @@ with job(snakemake) as log:
     size = read_json(source.figures)["mean_edge"]
     options = meso_options(params.meso, size, params.axis, params.coarsest)
     system = meso_system(mesh, load_volume(source.reference)[0], options)
-    fields = {params.coarser: mesh_field(source.coarser, source.start)}
+    before = load_notes(source.start)["best"] if params.coarsest else params.coarser
+    fields = {before: mesh_field(source.coarser, source.start)}
     fields |= {name: candidate(name, source, params.axis) for name in params.names}
     starts = {name: field(mesh.points) for name, field in fields.items()}
     deformed = load_volume(source.deformed)[0]

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from addvc.fem.mesh import Mesh, cell_volumes
-
 SPACING = 0.25
 """Of the grid, in cell sizes."""
 
@@ -80,12 +78,6 @@ def cell_strain(
             w = weight[nodes] * window(away, cell_size)
             grid.gradient[place] = gradient(away, u[nodes], w, valid[nodes] > 0, cell_size)
     return grid
-
-
-def nodal_volumes(mesh: Mesh) -> np.ndarray:
-    """Volume (n,) of the solid around each node, voxels^3: a fourth of each of its tetrahedra."""
-    volume = np.abs(cell_volumes(mesh)) / 4
-    return np.bincount(mesh.cells.ravel(), np.repeat(volume, 4), len(mesh.points))
 
 
 def window(away: np.ndarray, cell_size: float) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
-from addvc.fem.mesh import Mesh, cell_volumes
+from addvc.fem.mesh import Mesh, cell_volumes, nodal_volumes
 from addvc.geometry.lines import nearest_line, resampled
 from addvc.geometry.skeleton import FREE_END, StrutGraph
 
@@ -74,7 +74,7 @@ def partition(mesh: Mesh, graph: StrutGraph, excess: np.ndarray) -> list[Strut]:
     if not graph.branches:
         return []
     volume, centre = np.abs(cell_volumes(mesh)), mesh.points[mesh.cells].mean(axis=1)
-    weight = np.bincount(mesh.cells.ravel(), np.repeat(volume / 4, 4), len(mesh.points))
+    weight = nodal_volumes(mesh)
     lines = [resampled(branch.points) for branch in graph.branches]
     cells, nodes = (nearest_line(lines, x) for x in (centre, mesh.points))
     struts = []

@@ -6,6 +6,7 @@ platens have moved by since the reference, and `composed` the displacement follo
 from that state to this one (an updated reference).
 """
 
+import logging
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -17,6 +18,8 @@ from addvc.errors import CorrelationError
 from addvc.fem.io import read_mesh
 from addvc.images.platens import find_platens
 from addvc.images.scans_store import load_volume
+
+log = logging.getLogger(__name__)
 
 Field = Callable[[np.ndarray], np.ndarray]  # u (n, 3) at points (n, 3), voxels
 
@@ -32,7 +35,23 @@ def spline_field(path: str) -> Field:
 def mesh_field(mesh: str, path: str) -> Field:
     """A displacement on a tetrahedral mesh; nearest cell outside of it."""
     u, cells = load_field(path), read_mesh(mesh)
-    return lambda points: transfer_matrix(cells, points)[0] @ u
+
+    def at(points):
+        into, outside = transfer_matrix(cells, points)
+        log.info("%d of %d points are outside of %s: extrapolated", outside, len(points), mesh)
+        return into @ u
+
+    return at
+
+
+def followed(first: Field, second: Field) -> Field:
+    """A displacement, then another of the points where it has led to."""
+
+    def at(points):
+        u = first(points)
+        return u + second(points + u)
+
+    return at
 
 
 def shortening(reference: np.ndarray, deformed: np.ndarray, axis: int) -> float:
@@ -66,5 +85,4 @@ def candidate(name: str, source: Mapping[str, str], axis: int) -> Field:
     if name == "extrapolated":
         ratio = platen_ratio(source, axis)
         return lambda points: ratio * previous(points)
-    step = spline_field(source["step"])
-    return lambda points: previous(points) + step(points + previous(points))
+    return followed(previous, spline_field(source["step"]))

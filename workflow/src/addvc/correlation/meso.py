@@ -104,7 +104,8 @@ def meso_system(
 
 
 def held(mesh: Mesh, h: sparse.bsr_matrix) -> sparse.spmatrix:
-    """A Laplacian so weak that it only holds nodes with hardly a voxel that counts around them.
+    """A Laplacian so weak that it only holds nodes with hardly a voxel that counts around them. It
+    damps steps: A has it, the functional has not.
 
     It moves meso 33 of the default twin by .002 voxel at 28.5 % and less before; with a ten-
     thousandth of it the corners of a box of foam 96 voxels wide, which one strut touches, drift for

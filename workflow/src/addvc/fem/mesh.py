@@ -52,6 +52,12 @@ def cell_volumes(mesh: Mesh) -> np.ndarray:
     return np.einsum("ei,ei->e", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6
 
 
+def nodal_volumes(mesh: Mesh) -> np.ndarray:
+    """Volume (n,) of the solid around each node, voxels^3: a fourth of each of its tetrahedra."""
+    volume = np.abs(cell_volumes(mesh)) / 4
+    return np.bincount(mesh.cells.ravel(), np.repeat(volume, 4), len(mesh.points))
+
+
 def mean_edge_length(mesh: Mesh) -> float:
     """Mean length of the distinct edges of a tetrahedral mesh, voxels (what Table 2 calls size)."""
     edges = np.unique(np.sort(mesh.cells[:, TET_EDGES].reshape(-1, 2), axis=1), axis=0)

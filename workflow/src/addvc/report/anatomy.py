@@ -118,14 +118,19 @@ def region(case: Case, outputs: Iterable[str]) -> None:
         "region (blue) in the foam (grey)": render(layers, view, 80, shadows=True),
         "its mesh close up": _close_up(mesh, case, view),
     }
+    counts = f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra"
+    text = f"micro mesh: {counts} of {facts['mean_volume']:.2f} voxel³ in the mean"
+    _side_by_side(case, pictures, text, outputs)
+
+
+def _side_by_side(case: Case, pictures: dict, text: str, outputs: Iterable[str]) -> None:
+    """Two pictures {title: picture}, each at its own scale, and words below them."""
     tallest = max(picture.aspect for picture in pictures.values())
     fig, axes = style.panels(1, 2, tallest, spare=18, below=8)
     for panel, (ax, (title, picture)) in enumerate(zip(axes[0], pictures.items(), strict=True)):
         picture.show(ax)
         style.headline(ax, title, panel)
         style.scale_bar(ax, case.voxel_um())
-    counts = f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra"
-    text = f"micro mesh: {counts} of {facts['mean_volume']:.2f} voxel³ in the mean"
     fig.supxlabel(text, fontsize=8.5)
     style.save(fig, outputs)
 
@@ -189,15 +194,8 @@ def local_region(case: Case, outputs: Iterable[str]) -> None:
         "slab (blue) in the foam (grey)": render([behind, cut, before], side, 80),
         "the slab alone, along its normal": render([cut], view, 80, shadows=True),
     }
-    tallest = max(picture.aspect for picture in pictures.values())
-    fig, axes = style.panels(1, 2, tallest, spare=18, below=8)
-    for panel, (ax, (title, picture)) in enumerate(zip(axes[0], pictures.items(), strict=True)):
-        picture.show(ax)
-        style.headline(ax, title, panel)
-        style.scale_bar(ax, case.voxel_um())
     thick = f"{last - first:.1f} voxels thick ({(last - first) / size:.2f} cell size)"
-    fig.supxlabel(f"slab: {thick}, normal to {style.AXES[normal]}", fontsize=8.5)
-    style.save(fig, outputs)
+    _side_by_side(case, pictures, f"slab: {thick}, normal to {style.AXES[normal]}", outputs)
 
 
 def _around(case: Case, box: tuple, normal: int) -> tuple[Layer, Layer]:

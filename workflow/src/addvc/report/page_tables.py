@@ -1,0 +1,103 @@
+"""Tables of the first page of the report, in reStructuredText."""
+
+
+def figure(value: float | None, form: str) -> str:
+    """A number in a format, or "unknown": a state that left the image has no residual."""
+    return "unknown" if value is None else format(value, form)
+
+
+def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
+    """A table in reStructuredText; "None." in place of one without rows."""
+    if not rows:
+        return ["", "None.", ""]
+    lines = ["", ".. list-table::", "   :header-rows: 1", ""]
+    for row in [header, *rows]:
+        lines += [("   * - " if n == 0 else "     - ") + str(cell) for n, cell in enumerate(row)]
+    return [*lines, ""]
+
+
+def results_table(summary: dict) -> list[str]:
+    """sigma(r) on the micro quadrature and, with a truth, the error at bulk nodes."""
+    known = any(state[mesh]["error"] for state in summary["states"] for mesh in summary["meshes"])
+    header = ["state", "mesh", "sigma(r), grey levels"]
+    header += ["error median, voxel", "error p95, voxel", "error rms, voxel"] if known else []
+    rows = []
+    for state in summary["states"]:
+        for mesh in summary["meshes"]:
+            error = state[mesh]["error"] or {}
+            row = [state["label"], mesh, figure(state[mesh]["residual_std"], ".3f")]
+            rows.append(row + [f"{error[key]:.3f}" for key in ("median", "p95", "rms") if error])
+    return list_table(header, rows)
+
+
+def convergence_table(summary: dict) -> list[str]:
+    """Start, iterations and last step of every state and mesh."""
+    rows = [
+        [
+            state["label"],
+            state["micro_start"] if mesh.startswith("micro") else state[mesh]["start"],
+            mesh,
+            str(state[mesh]["iterations"]),
+            figure(state[mesh]["last_step"], ".1e"),
+            "yes" if state[mesh]["converged"] else "NO",
+        ]
+        for state in summary["states"]
+        for mesh in summary["meshes"]
+    ]
+    return list_table(
+        ["state", "start", "mesh", "iterations", "last rms(du), voxel", "converged"], rows
+    )
+
+
+def meshes_table(summary: dict) -> list[str]:
+    """Size, quality and ultimate error of each mesh."""
+    rows = [
+        [
+            name,
+            str(m["nodes"]),
+            str(m["cells"]),
+            f"{m['mean_edge']:.2f}",
+            f"{m['mean_volume']:.3g}",
+            f"{m['min_dihedral']:.1f}",
+            f"{m['ultimate_error']:.2e}" + ("" if m["ultimate_converged"] else " (not converged)"),
+        ]
+        for name, m in summary["meshes"].items()
+    ]
+    return list_table(
+        [
+            "mesh",
+            "nodes",
+            "cells",
+            "mean edge, voxel",
+            "mean volume, voxel^3",
+            "least dihedral angle, degrees",
+            "ultimate error (rigid shift: a lower bound), voxel",
+        ],
+        rows,
+    )
+
+
+def cost_table(cost: dict) -> list[str]:
+    """CPU time, wall time and peak memory of each rule, the dearest first."""
+    rows = [
+        [rule, str(c["jobs"]), f"{c['cpu_s']:.0f}", f"{c['wall_s']:.0f}", f"{c['max_rss_mb']:.0f}"]
+        for rule, c in sorted(cost.items(), key=lambda item: -item[1]["cpu_s"])
+    ]
+    return list_table(["rule", "jobs", "CPU, s", "wall, s", "peak memory, MB"], rows)
+
+
+def scans_table(scans: dict) -> list[str]:
+    """The input files."""
+    rows = [
+        [f"``{row['path']}``", " x ".join(map(str, row["shape"])), row["dtype"]]
+        for row in scans["scans"]
+    ]
+    return list_table(["file", "shape, voxels", "type"], rows)
+
+
+def hashes_list(hashes: dict[str, str]) -> list[str]:
+    """SHA-256 of the files of each scan."""
+    if not hashes:
+        return []
+    rows = [f"   {number}  {path}" for path, number in hashes.items()]
+    return ["SHA-256 (of several files: one after the other)::", "", *rows, ""]
