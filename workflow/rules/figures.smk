@@ -553,8 +553,7 @@ if STATES:
             solutions(MICRO[0]),
             fields(MICRO[0]),
             f"{R}/geometry/struts.h5",
-            f"{R}/analysis/uncertainty.h5",
-            f"{R}/analysis/uncertainty.json",
+            uncertainty(),
             uncertainty_truth(),
         output:
             shown("more_uncertainty.png", "more_uncertainty", "Quality", "uncertainty"),

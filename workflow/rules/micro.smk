@@ -161,11 +161,13 @@ rule micro_dvc:
     params:
         code=code("micro/micro_dvc.py"),
         method=method_of,
+        blur=config["images"]["blur"],
         micro=section(
             "micro",
             "tolerance",
             "max_iterations",
             "nu",
+            "l_e",
             "robust",
             "rotated",
             "stages",
