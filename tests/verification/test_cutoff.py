@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from addvc.config import chooses
 from addvc.correlation.corotational import Stage, corotational, stage_system
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial
 from addvc.correlation.metric import hessian
-from addvc.correlation.micro import chooses, ladder
+from addvc.correlation.micro import ladder
 from addvc.correlation.register import Stop, register
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.assembly import node_pattern

@@ -684,6 +684,34 @@ if STATES:
             "../scripts/figures/more_warp.py"
 
 
+if STATES and settings.chooses(config["micro"], METHODS[MICRO[0]]):
+
+    rule more_cutoff:
+        input:
+            SPECIMEN,
+            smooth(0),
+            solutions(MICRO[0]),
+            fields(MICRO[0]),
+        output:
+            shown("more_cutoff.png", "more_cutoff", "Quality", "choice of l_E"),
+            drawing("more_cutoff"),
+        log:
+            f"{R}/logs/figures/more_cutoff.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_cutoff.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=10,
+        params:
+            code=code("figures/more_cutoff.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_cutoff.py"
+
+
 if STATES and HAS_TRUTH:
 
     rule more_error:

@@ -119,7 +119,8 @@ def corotational(
     After the first of several, l_E is chosen where there is a ladder. Mending comes between the others
     and the last stage, in which what is then in doubt does not count. The solution has the history of
     all stages and converged if the last one did; of the notes, `stages` has a row of figures for each,
-    `c` and `l_e` are the weight of the energy and its cut-off in the end, `risk` the trials of l_E."""
+    `c` and `l_e` are the weight of the energy and its cut-off in the end, `risk` the trials of l_E, all
+    in grey levels^2 over the points."""
     *early, last = stages
     done: list[tuple[Solution, dict]] = []
     trials: list[dict] = []
@@ -157,6 +158,7 @@ def with_cutoff(
             return problem, u, done, []
         u = done[-1][0].u
         best, trials = least_risk(trial(system, deformed, u, ladder), ladder, rung)
+        trials = [row | {"l_e": row["times"] * problem.cutoff} for row in trials]
         problem = problem.cut_off(RATIO ** (best - rung))
         log.info("micro DVC: least risk at l_E = %.3g voxels", problem.cutoff)
         if abs(best - rung) <= FAR or len(done) == ROUNDS:

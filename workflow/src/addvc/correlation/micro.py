@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from addvc.config import chooses
 from addvc.correlation.corotational import Mending, Problem, Stage, early, stage_system
 from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import residual_limit
@@ -135,12 +136,6 @@ def ladder(section: dict, levels: dict, blur: float, method: str) -> Ladder | No
     """What l_E is chosen from, from the `micro` section and the noise of the grey `levels` after the
     pre-filter `blur` (voxels); None where it is given, or there is no stage to choose it in."""
     return Ladder(Noise(levels["noise"], blur)) if chooses(section, method) else None
-
-
-def chooses(section: dict, method: str) -> bool:
-    """Whether the images choose l_E, from the `micro` section of a configuration."""
-    given = section["l_e"] != "auto" or "l_e" in section.get("times", {})
-    return not given and section["stages"] > 1 and method not in ("eq10", "without_choice")
 
 
 def mending(section: dict, levels: dict) -> Mending | None:

@@ -106,7 +106,11 @@ class Case:
 
     def cutoff(self, mesh: str, state: int) -> float:
         """l_E (voxels) of a micro result of the default kind."""
-        return float(load_notes(self.path(f"dvc/{mesh}_state{state}.h5"))["l_e"])
+        return float(self.notes(mesh, state)["l_e"])
+
+    def notes(self, mesh: str, state: int) -> dict:
+        """What was noted with a solution."""
+        return load_notes(self.path(f"dvc/{mesh}_state{state}.h5"))
 
     def displacement(self, mesh: str, state: int) -> np.ndarray:
         """u (n, 3) in voxels at the nodes of the micro mesh, of a micro or a meso result."""

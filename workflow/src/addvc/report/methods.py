@@ -1,7 +1,7 @@
 """Methods to paste into a paper, with references, from the configuration and the numbers."""
 
-from addvc.config import loading_axis, micro_names
-from addvc.correlation.micro import chooses, micro_options
+from addvc.config import chooses, loading_axis, micro_names
+from addvc.correlation.micro import micro_options
 from addvc.report import style
 
 REFERENCES = {
