@@ -1,8 +1,7 @@
 """What the noise of the images does to the displacement of micro DVC in one state."""
 
-from addvc.correlation.micro import at_rest, micro_reference, shell_of
-from addvc.correlation.register import System
-from addvc.correlation.store import load_factor, load_notes, load_order, save_field
+from addvc.correlation.micro import micro_reference, shell_of, system_at_rest
+from addvc.correlation.store import save_field
 from addvc.correlation.uncertainty import Noise, fields_of_noise
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
@@ -15,12 +14,7 @@ with job(snakemake):
     grey = load_volume(source.reference)[0]
     shell = shell_of(params.method, load_quadrature(source.shell))
     reference = micro_reference(read_mesh(source.mesh), grey, shell)
-    if params.method == "eq10":
-        factor, extra, _ = load_factor(source.factor)
-        system = System(reference, extra, factor)
-    else:
-        order, _ = load_order(source.factor)
-        system = at_rest(reference, load_notes(source.solution)["c"], params.nu, order)
+    system = system_at_rest(reference, params.method, params.nu, source.factor, source.solution)
     noise = Noise(read_json(source.threshold)["noise"], params.blur)
     draws = fields_of_noise(system, grey.shape, noise)
     save_field(snakemake.output[0], draws)

@@ -12,6 +12,10 @@ a mean over draws, as in `correlation.uncertainty`; the same draws serve every l
 
 The search goes down a ladder of l_E from a converged u: for each rung one linear step, with
 conjugate gradients preconditioned by the factor at hand.
+
+On the default twin, rms error in voxels with l_E = 0.8 cell size in all states and with the one
+chosen: .088 / .071, .092 / .080, .109 / .107 at 3.4, 5.2, 12.3 % (l_E of 52, 52 and 35 voxels); where
+every strut moves on its own (benchmarks, `strut`) .544 / .419 (3 voxels).
 """
 
 import logging
@@ -31,8 +35,8 @@ from addvc.fem.assembly import node_pattern
 log = logging.getLogger(__name__)
 
 RATIO = 1.5
-"""Of neighbouring l_E: the risk is flat about its least, .70 and .66 (1e5 grey levels^2) at 12.3 %
-on the default twin."""
+"""Of neighbouring l_E: the risk is flat about its least. At 12.3 % on the default twin the error is
+.109, .107 and .115 voxel one rung below it, there, and one above."""
 
 PRECISE = 1e-2
 """Relative tolerance of the steps: risks differ by tenths."""

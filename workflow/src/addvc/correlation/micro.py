@@ -6,6 +6,7 @@ in a frame that turns with the struts (`correlation.corotational`).
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy import sparse
@@ -17,6 +18,7 @@ from addvc.correlation.doubt import residual_limit
 from addvc.correlation.metric import Reference, hessian, reference_on
 from addvc.correlation.register import Stop, System
 from addvc.correlation.regularisation import elastic_weight, equilibrium_gap
+from addvc.correlation.store import load_factor, load_notes, load_order
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.assembly import node_pattern
 from addvc.fem.mesh import Mesh
@@ -95,9 +97,18 @@ def elastic(
     return h + extra, extra, {"c": c, "l_e": options.l_e}
 
 
-def at_rest(reference: Reference, c: float, nu: float, order: np.ndarray | None = None) -> System:
-    """The system of `corotational` before any turning, with weight c of the elastic energy."""
-    return stage_system(Problem(reference, c, nu, order=order), Stage(rotated=False), None)
+def system_at_rest(
+    reference: Reference, method: str, nu: float, factor: str | Path, solution: str | Path | None
+) -> System:
+    """The system of a method before any turning, from what `factor` holds; with the weight of the
+    elastic energy that `solution` was found with, where there is one."""
+    if method == "eq10":
+        known, extra, _ = load_factor(factor)
+        return System(reference, extra, known)
+    order, weights = load_order(factor)
+    c = (weights if solution is None else load_notes(solution))["c"]
+    problem = Problem(reference, c, nu, order=order)
+    return stage_system(problem, Stage(rotated=False), None)
 
 
 def shell_of(method: str, shell: Quadrature) -> Quadrature | None:
