@@ -49,7 +49,7 @@ class Ladder:
     noise: Noise
     shortest: int = -5
     longest: int = 2
-    draws: int = 2
+    draws: int = 1
 
 
 @dataclass(frozen=True, eq=False)
