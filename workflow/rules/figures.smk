@@ -550,7 +550,7 @@ if STATES:
             SPECIMEN,
             smooth(0),
             meshes("micro"),
-            solutions(MICRO[0]),
+            solutions(FINEST, MICRO[0]),
             fields(MICRO[0]),
             f"{R}/geometry/struts.h5",
             uncertainty(),
