@@ -9,9 +9,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from snakemake_logger_plugin_addvc import clock, job_words
 
 from addvc.runtime import job
+from snakemake_logger_plugin_addvc import clock, job_words
 
 SOURCE = Path(__file__).parents[2] / "workflow/src"
 SNAKEFILE = """
