@@ -367,6 +367,7 @@ if STATES:
 
     rule fig12:
         input:
+            f"{R}/analysis/image_noise.json",
             residuals(FINEST, *MICRO),
             solutions(FINEST, *MICRO),
             fields(*MICRO),

@@ -49,7 +49,8 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
 
 
 def histograms(case: Case, outputs: Iterable[str]) -> None:
-    """Fig. 12: density of r over the struts, all states: finest meso mesh, each micro method."""
+    """Fig. 12: density of r over the struts, all states, beside that of noise alone: finest meso mesh,
+    each micro method."""
     names = [case.finest, *case.micro]
     fig = style.figure(92)
     axes = fig.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
@@ -57,6 +58,7 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
     for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
         for state in case.states:
             _density(ax, case, name, state, reach)
+        _noise_alone(ax, case, reach)
         kind = "mesoscale" if name == case.finest else "microscale"
         style.headline(ax, f"{kind} ({name})", number)
         ax.set_xlabel("residual r (grey levels)")
@@ -69,6 +71,17 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         ylim=(low, low + (high - low) * (1.05 + 0.13 * len(case.states))),
     )
     style.save(fig, outputs)
+
+
+def _noise_alone(ax: Axes, case: Case, reach: float) -> None:
+    """The normal distribution that noise alone would give, of the state that has most of it."""
+    known = [std for std in case.json("analysis/image_noise.json").values() if std is not None]
+    if not known:
+        return
+    r, std = np.linspace(-reach, reach, 400), max(known)
+    density = np.exp(-0.5 * (r / std) ** 2) / (std * np.sqrt(2 * np.pi))
+    label = f"noise alone, σ = {std:.2f}"
+    ax.plot(r, density, color=style.DARK, ls=":", lw=1, label=label, zorder=1)
 
 
 def _reach(case: Case) -> float:

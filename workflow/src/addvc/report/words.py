@@ -5,6 +5,7 @@ import yaml
 from addvc.errors import AddvcError
 from addvc.report.methods import methods
 from addvc.report.page_tables import (
+    RESIDUAL_WORDS,
     convergence_table,
     cost_table,
     figure,
@@ -29,7 +30,8 @@ def closing_lines(summary: dict, folder: str) -> str:
         found = state[micro]
         lines.append(
             f"  state {state['state']} ({state['strain']:.1%} measured): "
-            f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}, "
+            f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}"
+            f"{alone_words(state)}, "
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
             + flag_words(state.get("struts"))
             + error_words(found["error"])
@@ -47,6 +49,12 @@ def flag_words(struts: dict | None) -> str:
     if not struts:
         return ""
     return f", {struts['flagged']} of {struts['valid'] + struts['flagged']} struts flagged"
+
+
+def alone_words(state: dict) -> str:
+    """What noise alone would leave of the residual, where the images show it."""
+    alone = state.get("noise_std")
+    return "" if alone is None else f" (noise alone {alone:.2f})"
 
 
 def error_words(error: dict | None) -> str:
@@ -71,7 +79,7 @@ def front_page(summary: dict, config: dict, scans: dict) -> str:
     lines = heading(f"addvc: case {summary['case']}", "=")
     lines += answer(summary) + look_around(summary)
     lines += heading("Warnings and failures") + warnings(summary)
-    lines += heading("Residual and error of each mesh") + results_table(summary)
+    lines += [*heading("Residual and error of each mesh"), RESIDUAL_WORDS, *results_table(summary)]
     lines += heading("Convergence") + convergence_table(summary)
     lines += heading("Meshes") + meshes_table(summary)
     lines += heading("Cost") + cost_table(summary["cost"])
