@@ -5,9 +5,14 @@ LOOK_AROUND = [
     *([f"{R}/scene.html"] if STATES else []),
 ]
 
+CAPTIONS = sorted(map(str, (WORKFLOW / "report").glob("*.rst")))
 
+
+# Its commit is that of the last thing the report shows that was made.
 rule front_page:
     input:
+        FIGURES,
+        CAPTIONS,
         summary=f"{R}/summary.json",
         scans=f"{R}/input.json",
         hashes=f"{R}/input_hashes.json",
@@ -95,7 +100,7 @@ rule report:
         page=f"{R}/report/front.rst",
         config=f"{R}/report/config.json",
         stylesheet=str(WORKFLOW / "report/report.css"),
-        captions=sorted(map(str, (WORKFLOW / "report").glob("*.rst"))),
+        captions=CAPTIONS,
     output:
         f"{R}/report.html",
     log:
