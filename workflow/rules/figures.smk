@@ -314,6 +314,7 @@ if STATES:
     rule fig10:
         input:
             SPECIMEN,
+            smooth(0),
             meshes(*MESO),
             solutions(*MESO),
         output:

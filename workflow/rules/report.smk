@@ -87,6 +87,28 @@ if STATES:
             "../scripts/report/scene.py"
 
 
+rule captions:
+    input:
+        CAPTIONS,
+    output:
+        f"{R}/figures/captions.md",
+    log:
+        f"{R}/logs/captions/all.log",
+    benchmark:
+        f"{R}/benchmarks/captions/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600),
+        runtime=5,
+    params:
+        code=code("report/captions.py"),
+        entries=ENTRIES,
+    script:
+        "../scripts/report/captions.py"
+
+
 rule figures:
     input:
         FIGURES,

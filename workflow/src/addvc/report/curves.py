@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from addvc.report import style
 from addvc.report.case import Case
@@ -63,12 +63,12 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         style.headline(ax, f"{kind} ({name})", number)
         ax.set_xlabel("residual r (grey levels)")
         ax.xaxis.set_major_locator(MaxNLocator(5))
-        ax.legend(loc="upper left", handlelength=1.2, borderaxespad=0.1, fontsize=7)
+        ax.legend(loc="upper left", handlelength=1.4, borderaxespad=0.1, fontsize=7)
     low, high = axes[0].get_ylim()
     axes[0].set(
         ylabel="density (1 / grey level)",
         xlim=(-reach, reach),
-        ylim=(low, low + (high - low) * (1.05 + 0.13 * len(case.states))),
+        ylim=(low, low + (high - low) * (1.1 + 0.07 * (len(case.states) + 1))),
     )
     style.save(fig, outputs)
 
@@ -85,14 +85,14 @@ def _noise_alone(ax: Axes, case: Case, reach: float) -> None:
 
 
 def _reach(case: Case) -> float:
-    """Half width of the histograms: 4 standard deviations of the worst result that converged."""
+    """Half width of the histograms: 2.5 standard deviations of the worst result that converged."""
     sigma = [
         case.residual(name, state)[2]["std"]
         for name in (case.finest, *case.micro)
         for state in case.states
         if not case.status(name, state)
     ]
-    return 4 * float(max(sigma)) if sigma else 100.0
+    return 2.5 * float(max(sigma)) if sigma else 100.0
 
 
 def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
@@ -100,12 +100,13 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
     r, weight, stats = case.residual(name, state)
     counts, edges = np.histogram(r, bins=120, range=(-reach, reach), weights=weight)
     density = counts / (weight.sum() * np.diff(edges))
-    label = f"{case.labels[state]}, σ = {stats['std']:.2f}\n{case.verdict(name, state)}"
+    wrong = case.status(name, state)
+    label = f"{case.labels[state]}, σ = {stats['std']:.2f}" + (f", {wrong}" if wrong else "")
     ax.plot(
         (edges[1:] + edges[:-1]) / 2,
         density,
         color=style.SERIES[(state - 1) % 6],
-        ls="--" if case.status(name, state) else "-",
+        ls="--" if wrong else "-",
         lw=1.3,
         label=label,
     )
@@ -159,9 +160,6 @@ def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:
             found = case.json(f"analysis/error_{name}_state{state}.json")
             x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
             _error(axes, x, found, look[name], not case.status(name, state))
-    low, high = axes[0].get_ylim()
-    if high < 20 * low:
-        axes[0].yaxis.set_minor_formatter("{x:.2g}")
     handles = [
         style.line(style.SERIES[look[name] % 6], name, ls="", marker=style.MARKERS[look[name] % 6])
         for name in names
@@ -187,7 +185,9 @@ def _error_panels(case: Case, names: Sequence[str]) -> tuple:
         ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
         titles = [style.narrow(case.title(n, case.micro[0])) for n in case.states]
         ax.set_xticklabels(titles, fontsize=7)
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter(NullFormatter())
         ax.grid(axis="y", which="both", lw=0.3, color="#dddddd")
     axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")
     return fig, axes
