@@ -96,7 +96,7 @@ def micro_with(folder: Path, config: dict, state: int, changes: dict) -> tuple[n
     )
     _, _, weights = elastic(reference, micro_options(micro, cell, settings.loading_axis(config)))
     order, _ = load_order(folder / "dvc/micro_factor.h5")
-    problem = Problem(reference, weights["c"], micro["nu"], order)
+    problem = Problem(reference, weights["c"], micro["nu"], weights["l_e"], order)
     u = load_field(folder / f"dvc/micro_start_state{state}.h5")
     plan = stages(micro, levels), mending(micro, levels)
     solution, _ = corotational(problem, images[1], u, *plan)

@@ -44,6 +44,7 @@ def found(converged=True, valid=1.0, error=ERROR):
         "residual_std": 0.56,
         "residual_mean": -0.5,
         "valid_nodes": valid,
+        "l_e": 23.0,
         "seconds": 0.3,
         "error": error,
     }
@@ -61,6 +62,7 @@ def state(number, verdict, **micro):
         "verdict": verdict,
         "meso12": found(error=micro.get("error", ERROR)),
         "micro": found(**micro),
+        "uncertainty": {"rms": 0.07},
         "struts": None,
     }
 

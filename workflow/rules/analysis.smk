@@ -59,7 +59,7 @@ rule field:
         solutions=of_state("dvc/{mesh}_state{state}.h5", RESULTS),
         residuals=of_state("analysis/residual_{mesh}_state{state}.h5", RESULTS),
         threshold=f"{R}/geometry/threshold.json",
-        uncertainty=f"{R}/analysis/uncertainty.h5",
+        uncertainty=f"{R}/analysis/uncertainty_state{{state}}.h5",
     output:
         of_state("fields/{mesh}_state{state}.vtu", RESULTS),
     log:
@@ -135,7 +135,7 @@ if HAS_TRUTH:
         input:
             mesh=f"{R}/geometry/micro.vtu",
             field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
-            uncertainty=f"{R}/analysis/uncertainty.h5",
+            uncertainty=f"{R}/analysis/uncertainty_state{{state}}.h5",
             truth=TRUTH,
         output:
             f"{R}/analysis/uncertainty_truth_state{{state}}.json",
@@ -320,12 +320,13 @@ rule noise_draws:
         shell=f"{R}/geometry/shell.h5",
         factor=f"{R}/dvc/{MICRO[0]}_factor.h5",
         threshold=f"{R}/geometry/threshold.json",
+        solution=f"{R}/dvc/{MICRO[0]}_state{{state}}.h5",
     output:
-        f"{R}/dvc/{MICRO[0]}_noise.h5",
+        f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
     log:
-        f"{R}/logs/noise_draws/all.log",
+        f"{R}/logs/noise_draws/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/noise_draws/all.tsv"
+        f"{R}/benchmarks/noise_draws/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -336,21 +337,22 @@ rule noise_draws:
         code=code("analysis/noise_draws.py"),
         blur=config["images"]["blur"],
         method=METHODS[MICRO[0]],
+        nu=config["micro"]["nu"],
     script:
         "../scripts/analysis/noise_draws.py"
 
 
 rule uncertainty:
     input:
-        noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
+        noise=f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
         struts=f"{R}/geometry/struts.h5",
     output:
-        arrays=f"{R}/analysis/uncertainty.h5",
-        figures=f"{R}/analysis/uncertainty.json",
+        arrays=f"{R}/analysis/uncertainty_state{{state}}.h5",
+        figures=f"{R}/analysis/uncertainty_state{{state}}.json",
     log:
-        f"{R}/logs/uncertainty/all.log",
+        f"{R}/logs/uncertainty/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/uncertainty/all.tsv"
+        f"{R}/benchmarks/uncertainty/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -365,7 +367,7 @@ rule uncertainty:
 
 rule struts:
     input:
-        noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
+        noise=f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
         struts=f"{R}/geometry/struts.h5",
         field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
         meso=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
@@ -464,10 +466,9 @@ rule summary:
         else [],
         expand(
             f"{R}/{{name}}_state{{state}}.json",
-            name=["struts", "cells", "analysis/warp"],
+            name=["struts", "cells", "analysis/warp", "analysis/uncertainty"],
             state=STATES,
         ),
-        f"{R}/analysis/uncertainty.json",
         f"{R}/analysis/image_noise.json",
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:

@@ -66,6 +66,12 @@ def struts_truth(suffix):
     return expand(name, state=STATES) if HAS_TRUTH else []
 
 
+def uncertainty():
+    """What the noise leaves uncertain in every state."""
+    name = f"{R}/analysis/uncertainty_state{{state}}.{{suffix}}"
+    return expand(name, state=STATES, suffix=["h5", "json"])
+
+
 def uncertainty_truth():
     """Errors against their uncertainty, where there is a truth."""
     name = f"{R}/analysis/uncertainty_truth_state{{state}}.json"

@@ -1,4 +1,4 @@
-"""Fig. 4 and 12, and beyond the paper: convergence of every mesh, errors against a truth."""
+"""Fig. 4, 12; beyond the paper: convergence of every mesh, choice of l_E, errors against a truth."""
 
 from collections.abc import Iterable, Sequence
 
@@ -147,6 +147,28 @@ def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
     ax.plot(steps, solution.history, "o-", color=colour, ms=2.5, lw=1.1)
     if not solution.converged:
         ax.plot(steps[-1:], solution.history[-1:], "x", color=style.RED, ms=7, mew=2, zorder=4)
+
+
+def cutoff(case: Case, outputs: Iterable[str]) -> None:
+    """Unbiased risk of each l_E that the default micro method tried, above the least of its state."""
+    fig = style.figure(75, 110)
+    ax = fig.subplots()
+    for state in case.states:
+        colour = style.SERIES[(state - 1) % 6]
+        trials = case.notes(case.micro[0], state)["risk"]
+        if not trials:
+            continue
+        tried, risk = np.array(sorted((row["l_e"], row["risk"]) for row in trials)).T
+        risk = (risk - risk.min()) / risk.min()
+        ax.plot(tried, 100 * risk, "o-", color=colour, ms=4, label=case.title(state, case.micro[0]))
+        ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
+    ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um())})")
+    ax.set_ylabel("risk above its least (%)")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter("{x:g}")
+    fig.legend(loc="outside lower center", ncols=2)
+    style.save(fig, outputs)
 
 
 def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:

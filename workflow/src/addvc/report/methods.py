@@ -1,6 +1,6 @@
 """Methods to paste into a paper, with references, from the configuration and the numbers."""
 
-from addvc.config import loading_axis, micro_names
+from addvc.config import chooses, loading_axis, micro_names
 from addvc.correlation.micro import micro_options
 from addvc.report import style
 
@@ -28,6 +28,8 @@ REFERENCES = {
     "robust": "Geman S, McClure DE. Bayesian image analysis: an application to single photon emission "
     "tomography. Proceedings of the Statistical Computing Section, American Statistical Association, "
     "12-18 (1985)",
+    "stein": "Stein CM. Estimation of the mean of a multivariate normal distribution. The Annals of "
+    "Statistics 9(6), 1135-1151 (1981)",
     "limits": "Leclerc H, Périé JN, Hild F, Roux S. Digital volume correlation: what are the limits to "
     "the spatial resolution? Mechanics & Industry 13(6), 361-371 (2012)",
     "bending": "Deshpande VS, Ashby MF, Fleck NA. Foam topology: bending versus stretching dominated "
@@ -138,7 +140,8 @@ def micro(summary: dict, config: dict) -> str:
     wave = f"in weights set on a shear wave of period {options.period:g} voxels along {along}"
     for name, method in micro_names(config).items():
         lead = " The displacement of its nodes minimises" if name == "micro" else " For comparison:"
-        text += f"{lead} {functional(method, section, options)}, {wave} ({method})."
+        used = [state[name]["l_e"] for state in summary["states"] if method != "eq10"]
+        text += f"{lead} {functional(method, section, options, used)}, {wave} ({method})."
     first = section["methods"][0]
     if section["mending"] and section["stages"] > 1 and first != "eq10":
         text += (
@@ -151,8 +154,8 @@ def micro(summary: dict, config: dict) -> str:
     )
 
 
-def functional(method: str, section: dict, options) -> str:
-    """What a method of micro DVC minimises."""
+def functional(method: str, section: dict, options, cutoffs: list[float]) -> str:
+    """What a method of micro DVC minimises; `cutoffs`: l_E of every state (voxels)."""
     if method == "eq10":
         return (
             "the squared residual in the struts, regularised by the equilibrium gap {gap} below "
@@ -165,9 +168,17 @@ def functional(method: str, section: dict, options) -> str:
     return (
         f"the {'robust residual (Geman-McClure weights {robust})' if robust else 'squared residual'} "
         f"in the struts{f' and in the void within {shell:g} voxel of them' if shell else ''}, "
-        f"regularised below {options.l_e:.3g} voxels by an elastic energy (Poisson's ratio "
-        f"{options.nu:g}){' in a frame that turns with the struts' if turns else ''}"
+        f"regularised by an elastic energy (Poisson's ratio {options.nu:g})"
+        f"{' in a frame that turns with the struts' if turns else ''} below "
+        f"{span(cutoffs or [options.l_e], '.3g')} voxels{chosen_words(method, section)}"
     )
+
+
+def chosen_words(method: str, section: dict) -> str:
+    """Where the cut-off length came from."""
+    if chooses(section, method):
+        return ", the length of least unbiased risk {stein} in each state"
+    return ""
 
 
 def endings(summary: dict, method: str) -> str:
@@ -179,14 +190,15 @@ def endings(summary: dict, method: str) -> str:
 
 
 def noise_words(summary: dict) -> str:
-    """The standard uncertainty by noise in voxels and micrometres, where it was made."""
-    found = summary.get("uncertainty")
+    """The standard uncertainty by noise in voxels and micrometres."""
+    found = [state["uncertainty"]["rms"] for state in summary["states"]]
     if not found:
         return ""
-    size = found["rms"] * summary["voxel_size_um"]
+    micrometres = [rms * summary["voxel_size_um"] for rms in found]
     return (
-        f"By the noise of the images the standard uncertainty of the displacement of a node is "
-        f"{found['rms']:.3f} voxel ({size:.2g} micrometres, rms length of the vector). "
+        "By the noise of the images the standard uncertainty of the displacement of a node is "
+        f"{span(found, '.3f')} voxel ({span(micrometres, '.2g')} micrometres, rms length of the "
+        "vector). "
     )
 
 

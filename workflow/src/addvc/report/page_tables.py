@@ -41,12 +41,13 @@ def results_table(summary: dict) -> list[str]:
 
 
 def convergence_table(summary: dict) -> list[str]:
-    """Start, iterations and last step of every state and mesh."""
+    """Start, l_E, iterations and last step of every state and mesh."""
     rows = [
         [
             state["label"],
             state["micro_start"] if mesh.startswith("micro") else state[mesh]["start"],
             mesh,
+            "–" if state[mesh]["l_e"] is None else f"{state[mesh]['l_e']:.3g}",
             str(state[mesh]["iterations"]),
             figure(state[mesh]["last_step"], ".1e"),
             "yes" if state[mesh]["converged"] else "NO",
@@ -55,7 +56,8 @@ def convergence_table(summary: dict) -> list[str]:
         for mesh in summary["meshes"]
     ]
     return list_table(
-        ["state", "start", "mesh", "iterations", "last rms(du), voxel", "converged"], rows
+        ["state", "start", "mesh", "l_E, voxel", "iterations", "last rms(du), voxel", "converged"],
+        rows,
     )
 
 
