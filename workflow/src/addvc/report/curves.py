@@ -70,7 +70,14 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         xlim=(-reach, reach),
         ylim=(low, low + (high - low) * (1.1 + 0.07 * (len(case.states) + 1))),
     )
+    fig.legend(handles=_state_handles(case), loc="outside lower center", ncols=2)
     style.save(fig, outputs)
+
+
+def _state_handles(case: Case) -> list:
+    """A line a state, with what became of it by the default micro method."""
+    titles = {n: case.title(n, case.micro[0]) for n in case.states}
+    return [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
 
 
 def _noise_alone(ax: Axes, case: Case, reach: float) -> None:
@@ -131,9 +138,7 @@ def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float])
         ax.set_axis_off()
     for ax in axes[::columns]:
         ax.set_ylabel("rms(du) (voxels)")
-    titles = {n: case.title(n, case.micro[0]) for n in case.states}
-    handles = [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
-    handles.append(style.line("#777777", "criterion", ls=":"))
+    handles = [*_state_handles(case), style.line("#777777", "criterion", ls=":")]
     handles.append(style.line(style.RED, "not converged", ls="", marker="x"))
     fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
