@@ -102,6 +102,12 @@ def sections(text):
 # --------------------------------------------------------------------------- closing lines
 
 
+@pytest.mark.parametrize(("alone", "warned"), [(0.36, True), (0.38, False), (None, False)])
+def test_a_residual_far_above_the_noise_has_a_warning(alone, warned):
+    told = " ".join(warnings(summary(GOOD | {"noise_std": alone})))
+    assert ("1.6 times that of noise alone (at most 1.5)" in told) == warned
+
+
 def test_sigma_of_noise_alone_stands_beside_that_of_the_residual():
     known = GOOD | {"noise_std": 0.523}
     assert "sigma(r) 0.56 (noise alone 0.52), 4 it" in closing_lines(summary(known), "results/a")

@@ -6,6 +6,11 @@ def figure(value: float | None, form: str) -> str:
     return "unknown" if value is None else format(value, form)
 
 
+def micro_name(summary: dict) -> str:
+    """The default micro method: the first of them."""
+    return next(mesh for mesh in summary["meshes"] if mesh.startswith("micro"))
+
+
 def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
     """A table in reStructuredText; "None." in place of one without rows."""
     if not rows:
