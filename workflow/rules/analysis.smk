@@ -27,6 +27,31 @@ rule residual:
         "../scripts/analysis/residual.py"
 
 
+rule image_noise:
+    input:
+        specimen=f"{R}/geometry/specimen.json",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=expand(f"{R}/volumes/smooth{{state}}.h5", state=STATES),
+    output:
+        f"{R}/analysis/image_noise.json",
+    log:
+        f"{R}/logs/image_noise/all.log",
+    benchmark:
+        f"{R}/benchmarks/image_noise/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1000, 10.0),
+        runtime=10,
+    params:
+        code=code("analysis/image_noise.py"),
+        states=STATES,
+    script:
+        "../scripts/analysis/image_noise.py"
+
+
 rule field:
     input:
         meshes=[mesh_of(name) for name in RESULTS],
@@ -444,6 +469,7 @@ rule summary:
             name=["struts", "cells", "analysis/warp", "analysis/uncertainty"],
             state=STATES,
         ),
+        f"{R}/analysis/image_noise.json",
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",

@@ -314,6 +314,7 @@ if STATES:
     rule fig10:
         input:
             SPECIMEN,
+            smooth(0),
             meshes(*MESO),
             solutions(*MESO),
         output:
@@ -367,6 +368,7 @@ if STATES:
 
     rule fig12:
         input:
+            f"{R}/analysis/image_noise.json",
             residuals(FINEST, *MICRO),
             solutions(FINEST, *MICRO),
             fields(*MICRO),

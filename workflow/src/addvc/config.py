@@ -199,6 +199,13 @@ def check_values(config: dict, schema: dict) -> None:
     raise ConfigError(f"`{key}`: {error.message}. {meaning}")
 
 
+def scan_paths(config: dict) -> list[str]:
+    """The scans of the user's own, as the configuration has them: the reference, then the states."""
+    if "scans" not in config:
+        return []
+    return [config["scans"]["reference"], *config["scans"]["states"]]
+
+
 def scan_files(path: str) -> list[str]:
     """The files of a scan: itself, those of a folder, or those a pattern finds.
 

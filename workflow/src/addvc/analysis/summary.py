@@ -110,6 +110,7 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
         "uncertainty": read_json(folder / f"analysis/uncertainty_state{state}.json"),
         "warp": read_json(folder / f"analysis/warp_state{state}.json"),
         "cells": read_json(folder / f"cells_state{state}.json")["localisation"],
+        "noise_std": read_json(folder / "analysis/image_noise.json")[str(state)],
     }
 
 

@@ -202,6 +202,15 @@ def noise_words(summary: dict) -> str:
     )
 
 
+def alone_words(summary: dict) -> str:
+    """What noise alone would leave of the residual, where it is known."""
+    found = [state.get("noise_std") for state in summary["states"]]
+    known = [value for value in found if value is not None]
+    if not known:
+        return ""
+    return f", where the noise of both images alone would leave {span(known, '.2f')}"
+
+
 def quality(summary: dict) -> str:
     """Residual, ultimate error, validity, and the error where a truth is known."""
     found = [state["micro"] for state in summary["states"]]
@@ -211,10 +220,10 @@ def quality(summary: dict) -> str:
     ultimate = summary["meshes"]["micro"]["ultimate_error"]
     valid = span([100 * one["valid_nodes"] for one in found], ".1f")
     text = (
-        f"The residual has a standard deviation of {span(residuals, '.2f')} grey levels. "
-        f"{noise_words(summary)}Interpolation alone, under a rigid sub-voxel shift without noise "
-        f"{{limits}}, gives {ultimate:.1e} voxel. {valid} % of the nodes have a residual that the noise "
-        "of the images explains; the others are flagged."
+        f"The residual in the struts has a standard deviation of {span(residuals, '.2f')} grey levels"
+        f"{alone_words(summary)}. {noise_words(summary)}Interpolation alone, under a rigid sub-voxel "
+        f"shift without noise {{limits}}, gives {ultimate:.1e} voxel. {valid} % of the nodes have a "
+        "residual that the noise of the images explains; the others are flagged."
     )
     errors = [one["error"]["median"] for one in found if one["error"]]
     known = f" Against the known truth the median error is {span(errors or [0], '.3f')} voxel."
