@@ -5,7 +5,7 @@ from addvc.correlation.meso import chosen_register, meso_options, meso_system
 from addvc.correlation.store import load_notes, save_solution
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:
