@@ -164,18 +164,6 @@ def mesh_of_candidate(wildcards):
     return f"{R}/geometry/{name}.vtu"
 
 
-def coarser(wildcards):
-    """The mesh before this one; the coarsest starts from itself."""
-    return MESO[max(MESO.index(wildcards.meso) - 1, 0)]
-
-
-def start_of(wildcards):
-    """The best start for the coarsest mesh, the coarser solution for the others."""
-    if wildcards.meso == MESO[0]:
-        return f"{R}/dvc/start_state{wildcards.state}.h5"
-    return f"{R}/dvc/{coarser(wildcards)}_state{wildcards.state}.h5"
-
-
 def of_state(pattern, names):
     """Files of one state, one for each name: `{mesh}` in the pattern, `{state}` left to the rule."""
     return expand(f"{R}/{pattern}", mesh=names, state="{state}")

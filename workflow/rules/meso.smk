@@ -100,23 +100,18 @@ rule best_start:
 
 rule meso_dvc:
     input:
-        unpack(
-            lambda wildcards: (
-                {} if wildcards.meso == MESO[0] else field_files(wildcards)
-            )
-        ),
+        unpack(field_files),
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
-        mesh=f"{R}/geometry/{{meso}}.vtu",
-        figures=f"{R}/geometry/{{meso}}.json",
-        coarser=lambda wildcards: f"{R}/geometry/{coarser(wildcards)}.vtu",
-        start=start_of,
+        meshes=expand(f"{R}/geometry/{{mesh}}.vtu", mesh=MESO),
+        figures=expand(f"{R}/geometry/{{mesh}}.json", mesh=MESO),
+        start=f"{R}/dvc/start_state{{state}}.h5",
     output:
-        f"{R}/dvc/{{meso}}_state{{state}}.h5",
+        of_state("dvc/{mesh}_state{state}.h5", MESO),
     log:
-        f"{R}/logs/meso_dvc/{{meso}}_state{{state}}.log",
+        f"{R}/logs/meso_dvc/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/meso_dvc/{{meso}}_state{{state}}.tsv"
+        f"{R}/benchmarks/meso_dvc/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -126,11 +121,8 @@ rule meso_dvc:
     params:
         code=code("meso/meso_dvc.py"),
         meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
-        coarsest=lambda wildcards: wildcards.meso == MESO[0],
-        coarser=coarser,
-        names=lambda wildcards: (
-            [] if wildcards.meso == MESO[0] else fields_of(wildcards)
-        ),
+        meshes=MESO,
+        names=fields_of,
         axis=AXIS,
     script:
         "../scripts/meso/meso_dvc.py"

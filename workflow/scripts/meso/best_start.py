@@ -8,7 +8,7 @@ from addvc.correlation.store import load_field, save_solution
 from addvc.correlation.transfer import lattice_matrix
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake) as log:

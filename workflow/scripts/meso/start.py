@@ -7,7 +7,7 @@ from addvc.correlation.store import save_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.levels import pyramid
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_volume
 from addvc.runtime import job
 
 with job(snakemake):

@@ -7,6 +7,7 @@ correlation, is kept; the finer meshes choose between the coarser solution and `
 """
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -230,3 +231,19 @@ def chosen_register(
     solution = register(system, deformed, tried.u, rest, name)
     history, seconds = tried.history + solution.history, tried.seconds + solution.seconds
     return replace(solution, history=history, seconds=seconds), best, table
+
+
+def meso_dvc(
+    mesh: Mesh,
+    images: list[np.ndarray],
+    options: MesoOptions,
+    fields: dict[str, Callable[[np.ndarray], np.ndarray]],
+    name: str,
+) -> tuple[Solution, dict]:
+    """Eq. 9 on one mesh between two images, from the best of fields {name: points (n, 3) -> u}, and
+    which that was with the table of all."""
+    system = meso_system(mesh, images[0], options)
+    starts = {start: field_(mesh.points) for start, field_ in fields.items()}
+    solution, best, table = chosen_register(system, images[1], starts, options.stop, name)
+    log.info("%s starts from %s", name, best)
+    return solution, {"best": best, "candidates": table}

@@ -30,12 +30,9 @@ def tet_p2(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def hex_q1(xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """xi (Q, 3) in [-1, 1]^3 -> N (Q, 8), dN (Q, 8, 3); VTK's order of the corners."""
-    factors = 1 + xi[:, None, :] * HEX_CORNERS  # (Q, 8, 3)
-    shape = factors.prod(axis=2) / 8
-    slopes = np.empty((len(xi), 8, 3))
-    for j in range(3):
-        slopes[:, :, j] = HEX_CORNERS[:, j] * np.delete(factors, j, axis=2).prod(axis=2) / 8
-    return shape, slopes
+    x, y, z = (1 + xi[:, d, None] * HEX_CORNERS[:, d] for d in range(3))  # (Q, 8) each
+    slopes = np.stack([y * z, x * z, x * y], axis=2) * (HEX_CORNERS / 8)
+    return x * y * z / 8, slopes
 
 
 def gauss_tet(points: int) -> tuple[np.ndarray, np.ndarray]:
