@@ -23,10 +23,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
 
-from addvc.analysis.carried import Attached, first_motion
+from addvc.analysis.carried import NEAR, Attached, first_motion
 from addvc.analysis.strut_frame import StrutFrame
+from addvc.analysis.strut_table import RAW, Measured
 from addvc.fem.frame import FrameMotion, forces
 
 log = logging.getLogger(__name__)
@@ -94,22 +94,27 @@ def middle(matrix: sparse.spmatrix) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The motion of the frame with a weight; what is left (d, k, 3) of draws of the noise at the
-    points; the mean squares of the misfit and of what the filter takes from the draws, voxel^2;
-    V: generalised cross-validation."""
+    """The motion of the frame with a weight; mean squares of the misfit and of what the filter takes
+    from draws of the noise, voxel^2; the share of their square that it leaves; V(w)."""
 
     weight: float
     motion: FrameMotion
-    left: np.ndarray
     misfit: float
     taken: float
+    kept: float
     validation: float
 
 
-def solver(matrix: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
-    """x (N,) of matrix (N, N) x = b, for any b. Its pivots are not looked at, as `fem.solver` does:
-    squared equations of balance are all but singular, and Gauss-Newton mends what is lost."""
-    return cholesky(matrix, ordering_method="metis").solve_A
+def solver(matrix: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray] | None:
+    """x (N,) of matrix (N, N) x = b, for any b; None where it is not positive definite. Pivots are not
+    looked at, as `fem.solver` does: squared equations of balance are all but singular, and
+    Gauss-Newton mends what is lost."""
+    from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
+
+    try:
+        return cholesky(matrix, ordering_method="metis").solve_A
+    except CholmodNotPositiveDefiniteError:
+        return None
 
 
 def fitted(
@@ -118,10 +123,10 @@ def fitted(
     """The motion that is best with this weight, from another one; None where none is found."""
     for _ in range(ITERATIONS):
         matrix, right, slopes = problem.system(motion, weight, held)
-        try:
-            step = solver(matrix)(right)
-        except CholmodNotPositiveDefiniteError:
+        solve = solver(matrix)
+        if solve is None:
             return None
+        step = solve(right)
         carried = np.sqrt(mean_square((slopes @ step).reshape(-1, 3)))
         step = step.reshape(-1, 6)
         longest = np.abs(step).max(axis=1, keepdims=True)
@@ -131,14 +136,27 @@ def fitted(
     return None
 
 
+def filtered(
+    problem: Problem,
+    motion: FrameMotion,
+    weight: float,
+    draws: np.ndarray,
+    at: sparse.csr_matrix | None = None,
+) -> np.ndarray:
+    """What the filter leaves of draws (d, k, 3) of the noise, at the points or where a step of the
+    frame moves others by the slopes `at` (3 q, 6 n): (d, q, 3)."""
+    matrix, _, slopes = problem.system(motion, weight)
+    solve, at = solver(matrix), slopes if at is None else at
+    return np.stack([(at @ solve(slopes.T @ n.ravel())).reshape(-1, 3) for n in draws])
+
+
 def judged(problem: Problem, motion: FrameMotion, weight: float, draws: np.ndarray) -> Fit:
     """The fit with what the filter does to draws (d, k, 3) of the noise."""
-    matrix, _, slopes = problem.system(motion, weight)
-    solve = solver(matrix)
-    left = np.stack([slopes @ solve(slopes.T @ n.ravel()) for n in draws]).reshape(draws.shape)
+    left = filtered(problem, motion, weight, draws)
     misfit = mean_square(problem.error(motion))
-    kept = np.sum(left * draws) / np.sum(np.square(draws))
-    return Fit(weight, motion, left, misfit, mean_square(draws - left), misfit / (1 - kept) ** 2)
+    shared = np.sum(left * draws) / np.sum(np.square(draws, dtype=float))
+    kept = mean_square(left) / mean_square(draws)
+    return Fit(weight, motion, misfit, mean_square(draws - left), kept, misfit / (1 - shared) ** 2)
 
 
 def mean_square(x: np.ndarray) -> float:
@@ -164,38 +182,44 @@ def best_fit(problem: Problem, motion: FrameMotion, draws: np.ndarray) -> Fit | 
     return best
 
 
-@dataclass(frozen=True, eq=False)
-class Balanced:
-    """The displacement (n, 3) of the nodes of a mesh and the draws (d, n, 3) of its noise, filtered;
-    `notes`: weight, share of the noise that is left, rms misfit, over what noise explains."""
-
-    u: np.ndarray
-    draws: np.ndarray
-    notes: dict
-
-
 def balanced(
-    held: StrutFrame, points: np.ndarray, u: np.ndarray, valid: np.ndarray, draws: np.ndarray, nu: float
-) -> Balanced:
-    """The motion of the frame at nodes (n, 3) of a mesh within REACH of it, from u (n, 3) at those that
-    are `valid` (n,). What is left of the draws (d, n, 3) is scaled up where the noise at rest does not
-    explain the misfit. Nothing changes where no motion was found."""
-    attached = Attached.of(held.frame, points)
-    near = attached.distance < REACH
-    use = near & (valid > 0)
-    problem = Problem(held, attached[use], points[use] + u[use], nu)
-    fit = best_fit(problem, first_motion(held.frame, points[use], u[use]), draws[:, use])
+    held: StrutFrame, measured: Measured, valid: np.ndarray, nu: float
+) -> tuple[Measured, dict]:
+    """What was measured, with its draws of the noise, as the frame moves it at nodes within REACH, by
+    those that are `valid` (n,); nothing changes where no motion is found. Notes: the weight, the rms
+    misfit, by how much it exceeds what the noise at rest explains (the draws are scaled up so that it
+    does explain it), the share of the noise that is left."""
+    use = np.zeros(len(valid), dtype=bool)
+    if len(held.frame.pieces):
+        attached = Attached.of(held.frame, measured.points)
+        near = attached.distance < REACH
+        use = near & (valid > 0)
+    fit = None
+    if use.sum() > NEAR:
+        points, draws = measured.points[use], measured.draws[:, use]
+        problem = Problem(held, attached[use], points + measured.u[use], nu)
+        fit = best_fit(problem, first_motion(held.frame, points, measured.u[use]), draws)
     if fit is None:
         log.warning("WARNING: no equilibrium of the frame was found; struts are as measured")
-        return Balanced(u, draws, {"weight": None})
+        return measured, {"weight": None}
     scale = max(1.0, (fit.misfit / fit.taken) ** 0.5)
-    matrix, _, slopes = problem.system(fit.motion, fit.weight)
-    solve, all_slopes = solver(matrix), attached[near].slopes(fit.motion)
-    out, left = u.copy(), draws.copy()
-    out[near] = attached[near].moved(fit.motion) - points[near]
-    for one, n in zip(left, draws[:, use], strict=True):
-        one[near] = scale * (all_slopes @ solve(slopes.T @ n.ravel())).reshape(-1, 3)
-    return Balanced(out, left, {
-        "weight": fit.weight, "misfit": fit.misfit**0.5, "misfit_over_noise": scale,
-        "noise_left": (mean_square(fit.left) / mean_square(draws[:, use])) ** 0.5,
-    })  # fmt: skip
+    u, left = measured.u.copy(), measured.draws.copy()
+    u[near] = attached[near].moved(fit.motion) - measured.points[near]
+    left[:, near] = scale * filtered(
+        problem, fit.motion, fit.weight, draws, attached[near].slopes(fit.motion)
+    )
+    return Measured(measured.points, u, left), {
+        "weight": float(fit.weight), "misfit": fit.misfit**0.5, "misfit_over_noise": scale,
+        "noise_left": fit.kept**0.5,
+    }  # fmt: skip
+
+
+def micro_fields(
+    held: StrutFrame | None, measured: Measured, valid: np.ndarray, nu: float
+) -> tuple[dict[str, Measured], dict | None]:
+    """What struts are measured on, by the ending of its columns, and the notes of `balanced`; the
+    measured displacement alone where there is no frame."""
+    if held is None:
+        return {"": measured}, None
+    filtered_field, notes = balanced(held, measured, valid, nu)
+    return {"": filtered_field, RAW: measured}, notes

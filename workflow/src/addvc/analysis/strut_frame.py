@@ -75,12 +75,15 @@ def strut_frame(excess: np.ndarray, kept: np.ndarray, limit: float, region: Regi
     for the porosity above the void, kept (nx, ny, nz): what it keeps; all within the region."""
     inside = within(region, excess.shape)
     mask = largest(inside & (excess > LOWER * limit))
+    graph = strut_graph(mask)
+    if not graph.branches:
+        return StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
+                          np.zeros(0, bool), 0.0)  # fmt: skip
     near = ndimage.binary_dilation(mask, iterations=HALO) & inside
     contrast = excess[near].sum() / (kept & inside).sum()
     solid = Solid(np.argwhere(near).astype(float), excess[near] / contrast, excess * inside)
-    graph = strut_graph(mask)
     lines = [resampled(branch.points) for branch in graph.branches]
-    owned = nearest_line(lines, solid.voxels) if lines else []
+    owned = nearest_line(lines, solid.voxels)
     curves = [
         strut_curve(branch, line, solid.share[own].sum(), graph.radii, solid.excess)
         for branch, line, own in zip(graph.branches, lines, owned, strict=True)
@@ -98,7 +101,7 @@ def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
 def largest(mask: np.ndarray) -> np.ndarray:
     """The largest component (nx, ny, nz), of 26 neighbours."""
     label, _ = ndimage.label(mask, np.ones((3, 3, 3)))
-    count = np.bincount(label.ravel())
+    count = np.bincount(label.ravel(), minlength=2)
     count[0] = 0
     return (label == count.argmax()) & mask
 

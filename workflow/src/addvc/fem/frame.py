@@ -74,9 +74,7 @@ def moduli(frame: Frame, nu: float) -> np.ndarray:
         (slice(0, 3), area, SHEAR_FACTOR * shear * area),
         (slice(3, 6), 2 * shear * inertia, inertia),
     ):
-        out[:, block, block] = (
-            axial[:, None, None] * along + lateral[:, None, None] * across
-        )
+        out[:, block, block] = axial[:, None, None] * along + lateral[:, None, None] * across
     return out
 
 
