@@ -14,7 +14,12 @@ generalised cross-validation [Golub1979]
 
 S n being what the filter keeps of draws n of the noise, so that neither a truth nor the level of the
 noise is needed. Assumed are slender elastic struts of one stiffness, without contacts. Where they are
-not (hinges, contacts, struts that were not seen) the misfit grows with w, and a smaller w is chosen.
+not (hinges, contacts, struts that were not seen) the misfit is more than noise: a weight counts only
+if by Stein's estimate [Stein1981] the filtered displacement is nearer the truth than the measured one,
+
+    |u - u_w|^2 - s^2 E|n|^2 + 2 s^2 E n . S n < s^2 E|n|^2,
+
+even if the noise were s = 2 times that of the draws; else struts are measured as they are.
 """
 
 import logging
@@ -41,6 +46,9 @@ HELD, RELAXED = 1e-5, 1e-2
 DAMPED = 1e-4
 """Of the steps [Levenberg1944], likewise: a strut that carries no node of the mesh is swung about by
 little at a time."""
+
+DOUBTED = 2.0
+"""By how much the noise may exceed its draws: over the states of the default twin up to 1.6 times."""
 
 REACH = 3.5
 """Farthest node of the mesh that moves with the frame, voxels from its axis."""
@@ -95,7 +103,8 @@ def middle(matrix: sparse.spmatrix) -> float:
 @dataclass(frozen=True, eq=False)
 class Fit:
     """The motion of the frame with a weight; mean squares of the misfit and of what the filter takes
-    from draws of the noise, voxel^2; the share of their square that it leaves; V(w)."""
+    from draws of the noise, voxel^2; the share of their square that it leaves; V(w); whether the
+    filter helps."""
 
     weight: float
     motion: FrameMotion
@@ -103,6 +112,7 @@ class Fit:
     taken: float
     kept: float
     validation: float
+    helps: bool
 
 
 def solver(matrix: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray] | None:
@@ -152,11 +162,11 @@ def filtered(
 
 def judged(problem: Problem, motion: FrameMotion, weight: float, draws: np.ndarray) -> Fit:
     """The fit with what the filter does to draws (d, k, 3) of the noise."""
-    left = filtered(problem, motion, weight, draws)
-    misfit = mean_square(problem.error(motion))
-    shared = np.sum(left * draws) / np.sum(np.square(draws, dtype=float))
-    kept = mean_square(left) / mean_square(draws)
-    return Fit(weight, motion, misfit, mean_square(draws - left), kept, misfit / (1 - shared) ** 2)
+    left, noise = filtered(problem, motion, weight, draws), mean_square(draws)
+    misfit, kept = mean_square(problem.error(motion)), mean_square(left) / noise
+    cut = 1 - float(np.sum(left * draws) / np.sum(np.square(draws, dtype=float)))
+    helps = misfit < 2 * DOUBTED**2 * cut * noise
+    return Fit(weight, motion, misfit, mean_square(draws - left), kept, misfit / cut**2, helps)
 
 
 def mean_square(x: np.ndarray) -> float:
@@ -165,8 +175,8 @@ def mean_square(x: np.ndarray) -> float:
 
 
 def best_fit(problem: Problem, motion: FrameMotion, draws: np.ndarray) -> Fit | None:
-    """Over all weights, from the smallest on, the fit that cross-validation likes best; None where none
-    has settled."""
+    """Over all weights, from the smallest on, the fit that cross-validation likes best of those that
+    help; None where none has settled or helps."""
     best, motion = None, fitted(problem, motion, 0.0, RELAXED) or motion
     for weight in WEIGHTS:
         found = fitted(problem, motion, weight)
@@ -175,9 +185,9 @@ def best_fit(problem: Problem, motion: FrameMotion, draws: np.ndarray) -> Fit | 
             continue
         motion = found
         fit = judged(problem, motion, weight, draws)
-        log.info("weight %.3g: misfit %.4f voxel, V^0.5 %.4f voxel", weight,
-                 fit.misfit**0.5, fit.validation**0.5)  # fmt: skip
-        if best is None or fit.validation < best.validation:
+        log.info("weight %.3g: misfit %.4f voxel, V^0.5 %.4f voxel, %s", weight, fit.misfit**0.5,
+                 fit.validation**0.5, "helps" if fit.helps else "does not help")  # fmt: skip
+        if fit.helps and (best is None or fit.validation < best.validation):
             best = fit
     return best
 
@@ -200,7 +210,10 @@ def balanced(
         problem = Problem(held, attached[use], points + measured.u[use], nu)
         fit = best_fit(problem, first_motion(held.frame, points, measured.u[use]), draws)
     if fit is None:
-        log.warning("WARNING: no equilibrium of the frame was found; struts are as measured")
+        log.warning(
+            "WARNING: no equilibrium of the frame explains the displacement better than noise does; "
+            "struts are as measured"
+        )
         return measured, {"weight": None}
     scale = max(1.0, (fit.misfit / fit.taken) ** 0.5)
     u, left = measured.u.copy(), measured.draws.copy()
