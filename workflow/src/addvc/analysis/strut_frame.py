@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
 from addvc.analysis.struts import section_areas
@@ -45,9 +46,8 @@ LEAST_AREA = 0.3
 HALO = 2
 """Voxels around the solid that hold grey level of it."""
 
-CUT, NEAR_CUT = 1.0, 2.5
-"""Depth below the surface of the region, voxels, where all nodes may be loaded from outside, and
-where ends of struts and junctions may."""
+CUT = 1.0
+"""Depth below the surface of the region, voxels, where struts are cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,8 @@ def strut_frame(excess: np.ndarray, kept: np.ndarray, limit: float, region: Regi
         strut_curve(branch, line, solid.share[own].sum(), graph.radii, solid.excess)
         for branch, line, own in zip(graph.branches, lines, owned, strict=True)
     ]
-    return assembled(graph, curves, owned, solid, region)
+    frame, span = assembled(graph, curves, owned, solid)
+    return StrutFrame(frame, loaded(frame.points, mask, region), span)
 
 
 def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
@@ -137,12 +138,12 @@ def crossings(graph: StrutGraph, curves: list[Curve]) -> np.ndarray:
 
 
 def assembled(
-    graph: StrutGraph, curves: list[Curve], owned: list, solid: Solid, region: Region
-) -> StrutFrame:
-    """Pieces along all curves, and from their ends straight to the junctions."""
+    graph: StrutGraph, curves: list[Curve], owned: list, solid: Solid
+) -> tuple[Frame, float]:
+    """Pieces along all curves, and from their ends straight to the junctions; the median length of the
+    struts."""
     junctions = crossings(graph, curves)
-    points, pieces, area, ends = [junctions], [], [], [np.arange(len(junctions))]
-    count = len(junctions)
+    points, pieces, area, count = [junctions], [], [], len(junctions)
     for branch, curve, own in zip(graph.branches, curves, owned, strict=True):
         s = stations(branch, curve, junctions)
         first, second = (np.array([end] if end != FREE_END else [], int) for end in branch.ends)
@@ -152,11 +153,9 @@ def assembled(
         points.append(curve(s))
         pieces.append(np.stack([chain[:-1], chain[1:]], axis=1))
         area.append(sections_of(curve, at, solid.voxels[own], solid.share[own]))
-        ends.append(inner[[k for k, end in ((0, first), (-1, second)) if len(end) == 0]])
         count += len(s)
     frame = Frame(*(np.concatenate(part) for part in (points, pieces, area)))
-    spans = [len(part) * PIECE for part in pieces]
-    return StrutFrame(frame, loaded(frame.points, np.concatenate(ends), region), np.median(spans))
+    return frame, float(np.median([len(part) * PIECE for part in pieces]))
 
 
 def stations(branch: Branch, curve: Curve, junctions: np.ndarray) -> np.ndarray:
@@ -180,14 +179,22 @@ def sections_of(
     return np.maximum(section_areas(stations, s, share, max(radius / 2, 0.5)), LEAST_AREA)
 
 
-def loaded(points: np.ndarray, ends: np.ndarray, region: Region) -> np.ndarray:
-    """Which nodes (n,) may be loaded from outside: those at a cut; `ends`: the numbers of those that
-    are junctions or free ends."""
-    caps, sides = caps_depth(region, points)
-    depth = np.minimum(caps, sides) if region.cut_sides else caps
-    out = depth < CUT
-    out[ends] |= depth[ends] < NEAR_CUT
+def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
+    """Which nodes (n,) may be loaded from outside: those at a cut, and the nearest to each patch of the
+    solid (nx, ny, nz) there, where a strut goes on that may be too short here to have nodes."""
+    out = cut_depth(region, points) < CUT
+    grid = np.moveaxis(np.indices(mask.shape, dtype=np.float32), 0, -1)
+    label, count = ndimage.label(mask & (cut_depth(region, grid) < CUT), np.ones((3, 3, 3)))
+    if count:
+        patches = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
+        out[cKDTree(points).query(patches)[1]] = True
     return out
+
+
+def cut_depth(region: Region, points: np.ndarray) -> np.ndarray:
+    """Depth (...) of points (..., 3) below the surfaces of the region that cut through the solid."""
+    caps, sides = caps_depth(region, points)
+    return np.minimum(caps, sides) if region.cut_sides else caps
 
 
 def save_frame(path: str | Path, held: StrutFrame) -> None:
