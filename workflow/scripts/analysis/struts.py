@@ -13,19 +13,18 @@ from addvc.images.files import write_json
 from addvc.runtime import job
 
 with job(snakemake) as log:
-    source = snakemake.input
+    source, nu = snakemake.input, snakemake.params.nu
     struts, _ = load_partition(source.struts)
     points, cells, point, _ = read_vtu(source.field)
     u, draws = point["displacement"], load_field(source.noise)
     if turns(snakemake.params.micro, snakemake.params.method):
         draws = turned(Mesh(points, cells), u, draws)
-    micro, nu = Measured(points, u, draws), snakemake.params.nu
     held = load_frame(source.frame) if source.frame else None
-    fields, equilibrium = micro_fields(held, micro, point["valid"], nu)
+    fields, balance = micro_fields(held, Measured(points, u, draws), point["valid"], nu)
     fields[MESO] = Measured(points, load_field(source.meso))
     table = strut_table(struts, fields, point["valid"], nu)
     whole = {name: foam(table, end) for name, end in snakemake.params.results.items()}
-    log.info("%s, equilibrium: %s", whole, equilibrium)
+    notes = {"foam": whole, "equilibrium": balance}
     write_columns(snakemake.output.table, table)
-    notes = {"foam": whole, "equilibrium": equilibrium, "columns": described(list(fields))}
-    write_json(snakemake.output.notes, notes)
+    write_json(snakemake.output.notes, notes | {"columns": described(list(fields))})
+    log.info("%s", notes)

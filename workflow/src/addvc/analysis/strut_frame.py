@@ -182,9 +182,9 @@ def sections_of(
 def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
     """Which nodes (n,) may be loaded from outside: those at a cut, and the nearest to each patch of the
     solid (nx, ny, nz) there, where a strut goes on that may be too short here to have nodes."""
-    out = cut_depth(region, points) < CUT
+    out = cut_depth(region, points) <= CUT
     grid = np.moveaxis(np.indices(mask.shape, dtype=np.float32), 0, -1)
-    label, count = ndimage.label(mask & (cut_depth(region, grid) < CUT), np.ones((3, 3, 3)))
+    label, count = ndimage.label(mask & (cut_depth(region, grid) <= CUT), np.ones((3, 3, 3)))
     if count:
         patches = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
         out[cKDTree(points).query(patches)[1]] = True
