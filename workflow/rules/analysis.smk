@@ -177,7 +177,7 @@ if HAS_TRUTH:
         params:
             code=code("analysis/struts_truth.py"),
             nu=config["micro"]["nu"],
-            names=[MICRO[0], FINEST],
+            results=STRUT_RESULTS,
         script:
             "../scripts/analysis/struts_truth.py"
 
@@ -365,8 +365,33 @@ rule uncertainty:
         "../scripts/analysis/uncertainty.py"
 
 
+rule strut_frame:
+    input:
+        solid=f"{R}/geometry/solid.h5",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/volume0.h5",
+        region=f"{R}/geometry/region.json",
+    output:
+        f"{R}/geometry/frame.h5",
+    log:
+        f"{R}/logs/strut_frame/all.log",
+    benchmark:
+        f"{R}/benchmarks/strut_frame/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 15.0),
+        runtime=60,
+    params:
+        code=code("analysis/strut_frame.py"),
+    script:
+        "../scripts/analysis/strut_frame.py"
+
+
 rule struts:
     input:
+        frame=f"{R}/geometry/frame.h5" if EQUILIBRIUM else [],
         noise=f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
         struts=f"{R}/geometry/struts.h5",
         field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
@@ -382,14 +407,14 @@ rule struts:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1200, 10.0),
+        mem_mb=memory(1500, 15.0),
         runtime=60,
     params:
         code=code("analysis/struts.py"),
         nu=config["micro"]["nu"],
         micro=section("micro", "rotated"),
         method=METHODS[MICRO[0]],
-        names=[MICRO[0], FINEST],
+        results=STRUT_RESULTS,
     script:
         "../scripts/analysis/struts.py"
 

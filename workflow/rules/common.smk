@@ -52,6 +52,12 @@ MESO = settings.meso_names(config)
 FINEST = MESO[-1]
 METHODS = settings.micro_names(config)
 MICRO = list(METHODS)
+EQUILIBRIUM = config["struts"]["equilibrium"]
+STRUT_RESULTS = {  # results that struts are measured on, and how their columns end
+    MICRO[0]: "",
+    **({f"{MICRO[0]}_raw": "_raw"} if EQUILIBRIUM else {}),
+    FINEST: "_meso",
+}
 RESULTS = [*MESO, *MICRO]  # all that is measured on, coarse to fine
 EARLIER = ["previous", "extrapolated", "composed"]  # starts that need the state before
 FREEFORM = ["freeform"] if "freeform" in config["meso"]["candidates"] else []

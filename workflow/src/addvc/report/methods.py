@@ -32,6 +32,8 @@ REFERENCES = {
     "Statistics 9(6), 1135-1151 (1981)",
     "limits": "Leclerc H, Périé JN, Hild F, Roux S. Digital volume correlation: what are the limits to "
     "the spatial resolution? Mechanics & Industry 13(6), 361-371 (2012)",
+    "validation": "Golub GH, Heath M, Wahba G. Generalized cross-validation as a method for choosing a "
+    "good ridge parameter. Technometrics 21(2), 215-223 (1979)",
     "bending": "Deshpande VS, Ashby MF, Fleck NA. Foam topology: bending versus stretching dominated "
     "architectures. Acta Materialia 49(6), 1035-1040 (2001)",
     "gradient": "Zimmerman JA, Bammann DJ, Gao H. Deformation gradients for continuum mechanical "
@@ -67,7 +69,7 @@ def methods(summary: dict, config: dict, scans: dict) -> list[str]:
     """Paragraphs, then the references, as lines of reStructuredText."""
     cite = Citations()
     parts = [images(summary, config, scans), meso(summary, config), micro(summary, config)]
-    parts += [quality(summary), struts(summary)]
+    parts += [quality(summary), struts(summary, config)]
     lines = []
     for part in filter(None, parts):
         lines += [part.format_map(cite), ""]
@@ -230,12 +232,19 @@ def quality(summary: dict) -> str:
     return text + (known if errors else "")
 
 
-def struts(summary: dict) -> str:
+def struts(summary: dict, config: dict) -> str:
     """How struts and cells were analysed, and what came out."""
     found = [s["struts"] for s in summary["states"] if (s["struts"] or {}).get("bending_share")]
     if not found:
         return ""
     text = (
+        "Noise that no frame of elastic struts in equilibrium could follow was taken off the "
+        "displacement, with the weight of the equilibrium by generalised cross-validation "
+        "{validation}, unless that would add to the error by Stein's estimate {stein}. "
+        if config["struts"]["equilibrium"]
+        else ""
+    )
+    text += (
         "The motion of each strut was fitted by that of a geometrically exact beam; the energy of the "
         f"{span([one['valid'] for one in found], 'd')} valid struts is in bending {{bending}} by "
         f"{span([100 * one['bending_share'] for one in found], '.0f')} %."
