@@ -48,7 +48,7 @@ DAMPED = 1e-4
 little at a time."""
 
 DOUBTED = 2.0
-"""By how much the noise may exceed its draws: over the states of the default twin up to 1.6 times."""
+"""By how much the noise may exceed its draws, which know of no robust weights and no lost struts."""
 
 FEW = 4
 """Draws that choose the weight: each is a sum over all nodes."""
