@@ -71,9 +71,10 @@ def start_options(section: dict, size: float, axis: int) -> MesoOptions:
 def meso_quadrature(
     mesh: Mesh, coefficients: np.ndarray, clear: float, most: float = np.inf
 ) -> Quadrature:
-    """Voxel centres inside tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
+    """A point of each voxel in tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
     chosen = clear_voxels(coefficients, 1, clear) if clear > 0 else None
-    return voxel_points(mesh, coefficients.shape, thinning(coefficients.size, most), chosen)
+    stride = thinning(coefficients.size, most)
+    return voxel_points(mesh, coefficients.shape, stride, chosen, dithered=True)
 
 
 def thinning(voxels: int, most: float) -> int:
@@ -88,7 +89,7 @@ def meso_system(
     lines: list | None = None,
     most: float = np.inf,
 ) -> System:
-    """Eq. 9 with T = L on one mesh: I_r sampled at voxel centres, and A = H + M factorised.
+    """Eq. 9 with T = L on one mesh: I_r sampled at its voxels, and A = H + M factorised.
 
     `lines` are the grid lines of a hexahedral grid."""
     if lines is None:

@@ -42,11 +42,13 @@ def voxel_points(
     image_shape: tuple[int, int, int],
     stride: int = 1,
     chosen: np.ndarray | None = None,
+    dithered: bool = False,
 ) -> Quadrature:
     """Centres of the voxels inside a tetrahedral mesh, each owned by one cell, weight 1.
 
     With a `stride` one voxel in stride**3 is kept and weighs as much; of these only the `chosen`
-    ones, bool of `image_shape`. Raises MeshError when no voxel is inside."""
+    ones, bool of `image_shape`. `dithered`: not the centre of each but a point of it (`dither`), which
+    may lie beyond its cell by as little. Raises MeshError when no voxel is inside."""
     owner = voxel_owner(mesh.points, mesh.cells, np.asarray(image_shape, dtype=np.int64))
     if chosen is not None:
         owner[~chosen] = -1
@@ -60,8 +62,24 @@ def voxel_points(
     cell = owner[kept].ravel()[index]
     place = np.unravel_index(index, owner[kept].shape)
     points = stride * np.column_stack(place).astype(np.float64)
+    if dithered:
+        points = dither(points, image_shape)
     shape = barycentric(mesh, cell, points)
     return Quadrature(cell, shape, points, np.full(len(index), float(stride**3)))
+
+
+def dither(centres: np.ndarray, image_shape: tuple[int, int, int]) -> np.ndarray:
+    """A point of each voxel, given its centre (Q, 3), such that together they fill a voxel evenly.
+
+    The spline of Eq. 4 depends a little on where in a voxel it is taken: where an image has moved by
+    half a voxel, all centres along a flat face, such as a platen's, err alike. Points spread over
+    their voxels do not. Additive recurrence R3 [Roberts 2018] by the number of the voxel; no point
+    leaves the image."""
+    ratio = 1.2207440846057596  # g**4 = g + 1
+    step = ratio ** -np.arange(1.0, 4.0)
+    number = np.ravel_multi_index(tuple(centres.T.astype(np.int64)), image_shape)
+    moved = centres + number[:, None] * step % 1 - 0.5
+    return np.clip(moved, 0, np.array(image_shape) - 1.0)
 
 
 def barycentric(mesh: Mesh, cell: np.ndarray, points: np.ndarray) -> np.ndarray:
