@@ -60,8 +60,9 @@ def voxel_points(
             f"spans {mesh.points.min(0)} to {mesh.points.max(0)}; check the units"
         )
     cell = owner[kept].ravel()[index]
-    place = np.unravel_index(index, owner[kept].shape)
-    points = stride * np.column_stack(place).astype(np.float64)
+    points = np.empty((len(index), 3))
+    for d, place in enumerate(np.unravel_index(index, owner[kept].shape)):
+        points[:, d] = stride * place
     if dithered:
         points = dither(points, image_shape)
     shape = barycentric(mesh, cell, points)
@@ -77,20 +78,36 @@ def dither(centres: np.ndarray, image_shape: tuple[int, int, int]) -> np.ndarray
     leaves the image."""
     ratio = 1.2207440846057596  # g**4 = g + 1
     step = ratio ** -np.arange(1.0, 4.0)
-    number = np.ravel_multi_index(tuple(centres.T.astype(np.int64)), image_shape)
-    moved = centres + number[:, None] * step % 1 - 0.5
-    return np.clip(moved, 0, np.array(image_shape) - 1.0)
+    number = (centres[:, 0] * image_shape[1] + centres[:, 1]) * image_shape[2] + centres[:, 2]
+    moved = np.empty_like(centres)
+    for d, last in enumerate(np.array(image_shape) - 1.0):
+        moved[:, d] = np.clip(centres[:, d] + number * step[d] % 1 - 0.5, 0, last)
+    return moved
 
 
 def barycentric(mesh: Mesh, cell: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Eq. A1: N (Q, 4) at points (Q, 3) of the given tetrahedra (Q,); negative when outside."""
     few = len(cell) < len(mesh.cells)  # then invert for each point, not for each cell
-    cells, row = (mesh.cells[cell], slice(None)) if few else (mesh.cells, cell)
+    cells, row = (mesh.cells[cell], np.arange(len(cell))) if few else (mesh.cells, cell)
     origin = mesh.points[cells[:, 0]]
-    edges = mesh.points[cells[:, 1:]] - origin[:, None]
-    inverse = np.linalg.inv(edges)  # rows: x = xi @ edges
-    xi = np.einsum("qi,qij->qj", points - origin[row], inverse[row])
-    return np.column_stack([1 - xi.sum(axis=1), xi])
+    inverse = np.linalg.inv(mesh.points[cells[:, 1:]] - origin[:, None])  # rows: x = xi @ edges
+    return cell_coordinates(origin, inverse, row, points)
+
+
+@nb.njit(parallel=True, cache=True)
+def cell_coordinates(origin, inverse, cell, points):
+    """1 - sum xi and xi = (x - origin) @ inverse in the cell of each point, (Q, 4)."""
+    out = np.empty((len(cell), 4))
+    for q in nb.prange(len(cell)):
+        e, total = cell[q], 0.0
+        for j in range(3):
+            xi = 0.0
+            for i in range(3):
+                xi += (points[q, i] - origin[e, i]) * inverse[e, i, j]
+            out[q, 1 + j] = xi
+            total += xi
+        out[q, 0] = 1 - total
+    return out
 
 
 @nb.njit(cache=True)
