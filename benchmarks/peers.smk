@@ -63,6 +63,7 @@ rule study:
         runtime=120,
     params:
         code=code("study.py"),
+        workflow=folder_hash(TOP / "workflow"),
         schema=str(BENCHMARKS.parent / "workflow/schemas/config.schema.yaml"),
         states=lambda wildcards: CASES[wildcards.case]["states"],
     script:

@@ -5,7 +5,7 @@ by the result, with fresh noise. What is written is a case of the workflow.
 """
 
 from argparse import Namespace
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,12 @@ class BoneOptions:
     strain: float = 0.05
     increment: float = 0.0125
     noise: float = 5.0
+
+    @classmethod
+    def of(cls, given: dict) -> "BoneOptions":
+        """From a configuration; on a command line numbers are words."""
+        kind = {item.name: type(item.default) for item in fields(cls)}
+        return cls(**{name: kind[name](value) for name, value in given.items()})
 
 
 MEASURE = {

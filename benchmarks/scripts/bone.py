@@ -9,4 +9,4 @@ from addvc.runtime import job
 with job(snakemake):
     options = dict(snakemake.params.bone)
     scan, size = options.pop("scan"), options.pop("voxel_size_um")
-    write_bone(scan, Path(snakemake.output[0]).parent, BoneOptions(**options), size)
+    write_bone(scan, Path(snakemake.output[0]).parent, BoneOptions.of(options), float(size))

@@ -205,8 +205,13 @@ def test_missing_system_packages_are_asked_for_in_one_command(copy):
 )
 def test_run_uses_all_cores_unless_told_and_passes_the_rest_on(ready, words, given):
     result, calls = ready("run", *words.split())
-    assert calls[0] == f"snakemake --rerun-incomplete {given}".strip()
+    assert calls[0] == f"snakemake --rerun-incomplete --logger addvc {given}"
     assert result.returncode == 7  # snakemake's own
+
+
+def test_another_logger_may_be_asked_for(ready):
+    _, calls = ready("run", "-c1", "--logger", "rich")
+    assert calls[0] == "snakemake --rerun-incomplete -c1 --logger rich"
 
 
 def test_config_file_is_found_from_the_callers_folder(ready, tmp_path):
@@ -252,7 +257,7 @@ def test_lock_of_a_killed_run_is_cleared_but_not_that_of_a_live_one(ready):
         result, calls = ready("run", "-c1")
         live.terminate()
     assert f"snakemake is at work in this folder (process {live.pid})" in result.stderr
-    assert calls[0] == "snakemake --rerun-incomplete -c1"
+    assert calls[0] == "snakemake --rerun-incomplete --logger addvc -c1"
 
 
 def test_lock_held_from_another_machine_is_left_alone(ready):
@@ -265,4 +270,4 @@ def test_lock_held_from_another_machine_is_left_alone(ready):
     log.write_text("SNAKEMAKE\n  Host: elsewhere\n")
     result, calls = ready("run", "-c1")
     assert "locked by a run on elsewhere" in result.stderr
-    assert calls[0] == "snakemake --rerun-incomplete -c1"
+    assert calls[0] == "snakemake --rerun-incomplete --logger addvc -c1"

@@ -15,7 +15,18 @@ from addvc.fem.io import write_vtu
 from addvc.fem.mesh import boundary_faces
 from addvc.images.files import write_json
 from addvc.images.scans_store import save_volume
-from addvc.report import curves, meso, scene, starts, style, surfaces, tables, ultimate
+from addvc.report import (
+    captions,
+    curves,
+    meso,
+    scene,
+    starts,
+    style,
+    surfaces,
+    tables,
+    ultimate,
+    warp,
+)
 from addvc.report.case import Case, UndeclaredInput
 
 DESCRIPTION = {"labels": {1: "3.4 %", 2: "5.2 %"}, "meso": ["meso9"], "micro": ["micro"]}
@@ -35,6 +46,7 @@ def folder(tmp_path, cube):
     write_json(tmp_path / "geometry/specimen.json", specimen)
     write_json(tmp_path / "geometry/meso9.json", {"nodes": 1, "cells": 1, "mean_edge": 9.0})
     write_vtu(tmp_path / "geometry/meso9.vtu", cube.points, cube.cells)
+    write_json(tmp_path / "analysis/image_noise.json", {"1": 1.4, "2": None})
     save_volume(tmp_path / "volumes/smooth0.h5", rng.random((9, 11, 13)), 20.0)
     for state, flagged in ((1, 5), (2, 0)):
         foam = {"micro": {"valid": 7, "flagged": flagged, "bending_share": None}}
@@ -218,6 +230,40 @@ def test_figures_of_a_case_with_a_failed_state_are_drawn(case, tmp_path):
         page = np.array([style.HEIGHT, style.WIDTH]) * style.INCH * style.DPI
         assert (image.shape[:2] <= 1.03 * page).all()
         assert 0.001 < (image[..., :3].min(axis=-1) < 0.9).mean() < 0.9
+
+
+def test_rows_of_pictures_are_as_wide_and_as_high_as_their_aspects():
+    fig, axes = style.rows_of_pictures([1.2, 0.7], 2)
+    for row, aspect in zip(axes, (1.2, 0.7), strict=True):
+        for ax in row:
+            ax.imshow(np.zeros((round(100 * aspect), 100)))
+    fig.canvas.draw()
+    sizes = [ax.get_position().size * fig.get_size_inches() for ax in axes[:, 0]]
+    assert sizes[0][0] == pytest.approx(sizes[1][0], rel=0.05)
+    assert sizes[0][1] / sizes[1][1] == pytest.approx(1.2 / 0.7, rel=0.05)
+    plt.close(fig)
+
+
+def test_the_outline_of_a_picture_runs_around_what_it_shows():
+    image = np.full((60, 80, 3), 255, np.uint8)
+    image[20:40, 30:60] = 0
+    _, ax = plt.subplots()
+    warp._outline(ax, scene.Picture(image, (0.0, 8.0, 0.0, 6.0)))
+    [line] = ax.collections
+    points = np.vstack([path.vertices for path in line.get_paths()])
+    assert points.min(axis=0) == pytest.approx([3.0, 2.0], abs=0.06)
+    assert points.max(axis=0) == pytest.approx([6.0, 4.0], abs=0.06)
+    plt.close("all")
+
+
+def test_captions_stand_beside_their_pictures_in_the_words_of_the_report(tmp_path):
+    (tmp_path / "one.rst").write_text("Fig. 3 of the paper.\n\n**Shown:** Foam, ``u``.\n")
+    entries = [{"file": "fig03_a.png", "title": "Fig. 3: states", "caption": tmp_path / "one.rst"},
+               {"file": "table1.html", "title": "Table 1", "caption": tmp_path / "one.rst"}]  # fmt: skip
+    first, second = captions.captions_page(entries).split("## ")[1:]
+    assert first.startswith("Fig. 3: states\n\n`fig03_a.png`\n\n![Fig. 3: states](fig03_a.png)")
+    assert "**Shown:** Foam, `u`." in first
+    assert "![" not in second and "[table1.html](table1.html)" in second
 
 
 def test_ultimate_error_is_drawn_beside_what_was_expected(case, folder, tmp_path, monkeypatch):

@@ -20,12 +20,14 @@ SCANS = {"scans": [{"shape": [120, 140, 120]}] * 3, "bin": 3}
 def state(number, converged=True, error=None):
     found = {
         "converged": converged,
+        "l_e": 11.5 * number,
         "residual_std": 1.0 + number,
         "valid_nodes": 0.99,
         "error": error,
     }
     struts = {"valid": 340, "bending_share": 0.7 + 0.05 * number}
-    return {"label": f"{number} %", "micro": found, "struts": struts, "cells": {"bands": 1}}
+    return {"label": f"{number} %", "micro": found, "struts": struts, "cells": {"bands": 1},
+            "uncertainty": {"rms": 0.05 + 0.01 * number}}  # fmt: skip
 
 
 def summary(*states):
@@ -66,7 +68,12 @@ def test_each_method_is_told_with_what_it_uses():
     paper = told(config(methods=["eq10"]))
     assert "Geman-McClure" not in paper and "turns" not in paper and "(eq10)" in paper
     assert "carried by their neighbours" in both and "neighbours" not in paper
-    plain = told(config(methods=["corotational"], robust="none", rotated=False, shell=0, mending=0))
+    chosen = told(config(methods=["corotational"]))
+    assert "below 11.5 to 23 voxels, the length of least unbiased risk" in chosen
+    assert "0.060 to 0.070 voxel (1.2 to 1.4 micrometres" in chosen
+    plain = told(
+        config(methods=["corotational"], l_e=23, robust="none", rotated=False, shell=0, mending=0)
+    )
     for word in ("neighbours", "Geman-McClure", "turns", "void within", "equilibrium gap"):
         assert word not in plain
     assert "Labelle" not in told(config() | {"mesh": {"backend": "pytetwild"}})

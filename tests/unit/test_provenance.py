@@ -102,6 +102,22 @@ def test_the_place_of_the_repository_does_not_matter(tree):
     assert hashes(tree) == hashes(WORKFLOW)
 
 
+def test_the_hash_of_a_folder_is_that_of_names_and_contents(tree):
+    folder_hash = provenance(tree).folder_hash
+    seen = [folder_hash(tree)]
+    (tree / "src/addvc/fem/new.py").write_text("x = 1\n")
+    seen.append(folder_hash(tree))
+    (tree / "src/addvc/fem/new.py").rename(tree / "src/addvc/fem/other.py")
+    seen.append(folder_hash(tree))
+    append(tree / "scripts/micro/factor.py")
+    seen.append(folder_hash(tree))
+    assert len(set(seen)) == 4
+    (tree / "notes.txt").touch()
+    for path in tree.rglob("*.py"):
+        os.utime(path)
+    assert folder_hash(tree) == seen[-1]
+
+
 LOADED = """
 import ast, sys
 from pathlib import Path

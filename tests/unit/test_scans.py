@@ -14,12 +14,12 @@ from addvc.images.levels import bin_mean
 from addvc.images.scans import (
     ScanError,
     ScanFormat,
-    check_scans,
     load_volume,
     open_scan,
     read_binned,
     save_volume,
 )
+from addvc.images.scans_check import check_scans
 
 SHAPE = (34, 37, 41)  # x, y, z
 RAW = ScanFormat(shape=SHAPE[::-1], dtype="uint16")
@@ -273,23 +273,6 @@ def test_sizes_are_checked_before_reading(tmp_path, pages, factor, crop, message
         check_scans([tmp_path / "scan.npy"], ScanFormat(), factor, crop)
     with pytest.raises(ScanError, match=message):
         read_binned(open_scan(tmp_path / "scan.npy"), factor, crop)
-
-
-def test_check_scans_tells_what_it_found(tmp_path, pages):
-    for name, shift in (("a.npy", 0), ("b.npy", 1)):
-        np.save(tmp_path / name, pages + np.uint16(shift))
-    first, second = check_scans([tmp_path / "a.npy", tmp_path / "b.npy"], None, 2)
-    assert first["path"] == str(tmp_path / "a.npy")
-    assert (first["shape"], first["binned_shape"]) == ([34, 37, 41], [17, 18, 20])
-    assert (first["dtype"], first["bytes"]) == ("uint16", (tmp_path / "a.npy").stat().st_size)
-    assert len(first["fingerprint"]) == 64 and first["fingerprint"] != second["fingerprint"]
-
-
-def test_check_scans_names_both_of_unequal_size(tmp_path, pages):
-    np.save(tmp_path / "a.npy", pages)
-    np.save(tmp_path / "b.npy", pages[:-1])
-    with pytest.raises(ScanError, match=r"b.npy has \(34, 37, 40\) voxels, but .*a.npy has"):
-        check_scans([tmp_path / "a.npy", tmp_path / "b.npy"], ScanFormat())
 
 
 def test_volume_round_trip(tmp_path, volume):

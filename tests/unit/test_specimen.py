@@ -54,6 +54,14 @@ def cylinder(axis=AXIS, centre=CENTRE, radius=RADIUS):
     return struts(SHAPE) * np.clip(radius + 0.5 - distance, 0, 1)
 
 
+def box():
+    """Occupancy of a foam box in air."""
+    occupancy = struts(SHAPE).copy()
+    occupancy[:15] = occupancy[81:] = 0
+    occupancy[:, :, :12] = occupancy[:, :, 91:] = 0
+    return occupancy
+
+
 def blobs(shape, axis, fraction, seed=2417):
     """Occupancy of random blobs whose volume fraction varies by 30 % along the axis."""
     field = gaussian_filter(np.random.default_rng(seed).normal(size=shape), 3)
@@ -96,10 +104,7 @@ def test_foam_that_fills_the_image_is_a_box():
 
 
 def test_box_in_air():
-    occupancy = struts(SHAPE).copy()
-    occupancy[:15] = occupancy[81:] = 0
-    occupancy[:, :, :12] = occupancy[:, :, 91:] = 0
-    found = find_specimen(scanned(occupancy), AXIS)
+    found = find_specimen(scanned(box()), AXIS)
     assert found.kind == "box"
     assert_allclose(found.bounds, ((14.5, 80.5), (11.5, 90.5)), atol=2)
 
@@ -176,6 +181,39 @@ def test_too_few_rows_between_platens_that_were_found():
     image = scanned(cylinder(), faces=(50.0, 56.0))
     with pytest.raises(GeometryError, match="rows lie between the platens"):
         find_specimen(image, AXIS)
+
+
+@pytest.mark.parametrize(("axis", "name"), [(0, "x"), (2, "z")])
+@pytest.mark.parametrize("occupancy", [cylinder, box, lambda: struts(SHAPE)])
+def test_platens_on_another_axis_than_the_configured_one(axis, name, occupancy):
+    image = scanned(occupancy())
+    faces = r"with faces at 9\.\d and 99\.\d of 110 voxels: say loading_axis: y"
+    with pytest.raises(GeometryError, match=f"no platen along {name}, .* along y, {faces}"):
+        find_specimen(image, axis)
+    assert find_specimen(image, AXIS).axis == AXIS
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_platen_seen_from_its_side_is_no_specimen(axis):
+    image = scanned(cylinder(), faces=(9.3, None))
+    with pytest.raises(
+        GeometryError, match=r"is 1\d\.. voxels wide along y, the image 110, .* 25%"
+    ):
+        find_specimen(image, axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_specimens_without_platens_are_no_false_alarm(axis):
+    for occupancy in (cylinder(), struts(SHAPE), box()):
+        image = scanned(occupancy, faces=(None, None))
+        for platens in ("none", "auto"):
+            assert find_specimen(image, axis, platens=platens).low == -0.5
+
+
+def test_a_slim_specimen_in_air_is_one_down_to_a_quarter_of_the_image():
+    assert abs(find_specimen(scanned(cylinder(radius=20.0)), AXIS).radius - 20) < 2
+    with pytest.raises(GeometryError, match=r"cut the scan to the specimen by scans\.crop"):
+        find_specimen(scanned(cylinder(radius=9.0)), AXIS)
 
 
 def specimens():

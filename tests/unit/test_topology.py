@@ -24,8 +24,8 @@ from addvc.geometry.stuffing import stuff
 from addvc.images.files import write_json
 from addvc.report import topology as pictures
 from addvc.report.case import Case
+from addvc.report.doubts import topology_warnings
 from addvc.report.tables import write_table
-from addvc.report.words import topology_warnings
 
 SHAPE = (56, 40, 40)
 MIDDLE = np.array([28.0, 20.0, 20.0])

@@ -9,6 +9,7 @@ import pytest
 from snakemake.utils import validate
 
 from addvc.errors import AddvcError
+from addvc.report.page_tables import results_table
 from addvc.report.words import check_verdicts, closing_lines, front_page, micro_name, warnings
 
 CONFIG = {
@@ -43,6 +44,7 @@ def found(converged=True, valid=1.0, error=ERROR):
         "residual_std": 0.56,
         "residual_mean": -0.5,
         "valid_nodes": valid,
+        "l_e": 23.0,
         "seconds": 0.3,
         "error": error,
     }
@@ -60,6 +62,7 @@ def state(number, verdict, **micro):
         "verdict": verdict,
         "meso12": found(error=micro.get("error", ERROR)),
         "micro": found(**micro),
+        "uncertainty": {"rms": 0.07},
         "struts": None,
     }
 
@@ -97,6 +100,23 @@ def sections(text):
 
 
 # --------------------------------------------------------------------------- closing lines
+
+
+@pytest.mark.parametrize(("alone", "warned"), [(0.36, True), (0.38, False), (None, False)])
+def test_a_residual_far_above_the_noise_has_a_warning(alone, warned):
+    told = " ".join(warnings(summary(GOOD | {"noise_std": alone})))
+    assert ("1.6 times that of noise alone (at most 1.5)" in told) == warned
+
+
+def test_sigma_of_noise_alone_stands_beside_that_of_the_residual():
+    known = GOOD | {"noise_std": 0.523}
+    assert "sigma(r) 0.56 (noise alone 0.52), 4 it" in closing_lines(summary(known), "results/a")
+    page = front_page(summary(known, DOUBTFUL), CONFIG, SCANS)
+    assert "noise alone, grey levels" in page and "Gauss points of the micro mesh" in page
+    assert "noise alone" not in closing_lines(summary(GOOD), "results/a")
+    rows = results_table(summary(known, DOUBTFUL))
+    assert [row.strip() for row in rows].count("- 0.523") == 2, "each mesh of the one state"
+    assert "noise of both images alone would leave 0.52" in page
 
 
 @pytest.mark.parametrize(

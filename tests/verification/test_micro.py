@@ -8,49 +8,9 @@ from addvc.correlation.corotational import Mending, Problem, Stage, corotational
 from addvc.correlation.doubt import doubtful_nodes, without
 from addvc.correlation.micro import elastic, mending, micro_options, micro_reference, stages
 from addvc.correlation.register import Stop
-from addvc.fem.shell import shell_points
-from addvc.geometry.stuffing import stuff
+from verification.frame import CENTRE, CORNERS, SECTION, SHAPE, image, rms_error
 
-SHAPE = (44, 44, 44)
-CENTRE = np.full(3, 21.5)
-CORNERS = CENTRE + 11 * np.array(
-    [[-1, -1, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1], [0.2, -0.1, 0.1]]
-)
-STRUTS = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)]
-SECTION = {"l_k": "auto", "l_l": "auto", "l_e": "auto", "period": 35, "nu": 0.28}
 LAST = Stop(1e-4, 40)
-
-
-def frame(points):
-    """Grey levels of struts of radius 1.4, 20 in the void and 110 inside, at points (n, 3)."""
-    away = np.full(len(points), np.inf)
-    for a, b in STRUTS:
-        along = CORNERS[b] - CORNERS[a]
-        t = np.clip((points - CORNERS[a]) @ along / (along @ along), 0, 1)
-        away = np.minimum(away, np.linalg.norm(points - CORNERS[a] - t[:, None] * along, axis=1))
-    return 20 + 90 / (1 + np.exp((away - 1.4) / 0.35))
-
-
-def image(back, seed=None):
-    """The frame moved: the voxel at x shows what was at back(x); noise of 1.5 with a seed."""
-    voxels = np.stack(np.meshgrid(*map(np.arange, SHAPE), indexing="ij"), -1).reshape(-1, 3)
-    grey = frame(back(voxels.astype(float))).reshape(SHAPE)
-    if seed is not None:
-        grey += np.random.default_rng(seed).normal(scale=1.5, size=SHAPE)
-    return grey.astype(np.float32)
-
-
-@pytest.fixture(scope="module")
-def still():
-    return image(lambda x: x, 2417)
-
-
-@pytest.fixture(scope="module")
-def problem(still):
-    mesh = stuff(still, 60.0, 1.6)
-    reference = micro_reference(mesh, still, shell_points(mesh, still, 60.0))
-    options = micro_options(SECTION, 20.0, 1)
-    return Problem(reference, elastic(reference, options)[2]["c"], options.nu)
 
 
 def turned_by(degrees):
@@ -61,10 +21,6 @@ def turned_by(degrees):
         lambda x: (x - CENTRE) @ rotation.T + CENTRE - x,
         lambda x: (x - CENTRE) @ rotation + CENTRE,
     )
-
-
-def rms_error(u, truth):
-    return float(np.sqrt(np.mean(np.sum((u - truth) ** 2, axis=1))))
 
 
 def test_no_motion_is_no_motion(problem, still):
@@ -82,10 +38,10 @@ def test_a_large_turn_costs_no_energy(problem, degrees):
     truth = forth(points)
     wave = 0.5 * np.sin(2 * np.pi * points[:, [1, 2, 0]] / 30)
     plan = [Stage(True, 15.0, Stop(1e-2, 10)), Stage(True, 15.0, LAST)]
-    solution, rows = corotational(problem, image(back, 31), truth + wave, plan)
+    solution, notes = corotational(problem, image(back, 31), truth + wave, plan)
     assert solution.converged
     assert rms_error(solution.u, truth) < 0.06 < rms_error(truth + wave, truth) / 5
-    assert len(solution.history) == sum(row["iterations"] for row in rows)
+    assert len(solution.history) == sum(row["iterations"] for row in notes["stages"])
 
 
 def test_without_rotation_a_large_turn_is_an_error(problem):
@@ -145,11 +101,11 @@ def test_a_strut_that_went_astray_is_mended(problem):
     start = off_course(points, truth)
     plan = [Stage(True, 15.0, Stop(1e-2, 10)), Stage(True, 15.0, LAST)]
     lost, _ = corotational(problem, deformed, start, plan)
-    found, rows = corotational(problem, deformed, start, plan, Mending(3, 4.0, most=0.5))
+    found, notes = corotational(problem, deformed, start, plan, Mending(3, 4.0, most=0.5))
     assert rms_error(lost.u, truth) > 0.2
     assert rms_error(found.u, truth) < 0.06
     assert found.converged
-    assert [row["stage"] for row in rows][1:3] == ["carried", "carried"]
+    assert [row["stage"] for row in notes["stages"]][1:3] == ["carried", "carried"]
 
 
 def test_no_stage_of_mending_is_longer_than_the_last_may_be(problem):
@@ -157,15 +113,17 @@ def test_no_stage_of_mending_is_longer_than_the_last_may_be(problem):
     points = problem.reference.mesh.points
     start = off_course(points, forth(points))
     plan = [Stage(True, 15.0, Stop(1e-9, 3)), Stage(True, 15.0, Stop(1e-10, 3))]
-    _, rows = corotational(problem, image(back, 31), start, plan, Mending(1, 4.0, most=0.5))
+    _, notes = corotational(problem, image(back, 31), start, plan, Mending(1, 4.0, most=0.5))
+    rows = notes["stages"]
     assert [row["stage"] for row in rows[1:5]] == ["carried", "carried", "wide", "narrow"]
     assert [row["iterations"] for row in rows] == [3] * 6
 
 
 def test_nothing_is_mended_where_nothing_is_in_doubt(problem, still):
     start = np.zeros_like(problem.reference.mesh.points)
-    solution, rows = corotational(problem, still, start, [Stage(True, 15.0, LAST)], Mending(3, 4.0))
-    assert len(rows) == 1
+    plan = [Stage(True, 15.0, LAST)]
+    solution, notes = corotational(problem, still, start, plan, Mending(3, 4.0))
+    assert len(notes["stages"]) == 1
     np.testing.assert_array_equal(solution.u, 0)
 
 
@@ -175,8 +133,8 @@ def test_an_image_of_nothing_is_a_result_that_did_not_converge_or_moves_nowhere(
     noise = np.random.default_rng(2417).normal(60, 20, SHAPE).astype(np.float32)
     start = np.zeros_like(problem.reference.mesh.points)
     plan = [Stage(True, 15.0, Stop(1e-2, 3)), Stage(True, 15.0, Stop(1e-4, 3))]
-    solution, rows = corotational(problem, noise, start, plan, Mending(2, limit))
-    assert len(rows) == 2 and np.isfinite(solution.u).all()
+    solution, notes = corotational(problem, noise, start, plan, Mending(2, limit))
+    assert len(notes["stages"]) == 2 and np.isfinite(solution.u).all()
     doubtful = doubtful_nodes(problem.reference, noise, solution.u, limit)
     assert doubtful.mean() > 0.5
 

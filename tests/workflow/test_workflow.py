@@ -332,8 +332,19 @@ def test_a_raw_scan_of_the_wrong_size(place):
     (place / "scans/a.raw").write_bytes(bytes(40 * 42 * 44))
     done = snakemake(place, config=config)
     refused(done, "scans/a.raw: expected 147840 bytes", "found 73920", "correct scans.shape",
-            "the size would fit dtype uint8", "a stage of case raw could not be made")  # fmt: skip
-    assert started(done.stdout) == {"check_input"}
+            "the size would fit dtype uint8", "Configuration of case raw")  # fmt: skip
+    assert started(done.stdout) == set()
+
+
+def test_a_dry_run_tells_all_that_is_wrong_with_the_scans(place):
+    scans = {"reference": "scans/nowhere.tif", "states": ["scans/short.npy", "scans/good.npy"]}
+    config = bad_case(place, "dry", scans=scans)
+    (place / "scans/short.npy").write_bytes(b"")
+    save(place, "good.npy", np.zeros((24, 24, 24), np.uint8))
+    done = snakemake(place, "--dry-run", config=config)
+    refused(done, "2 things are wrong with the scans", "scan scans/nowhere.tif was not found",
+            "scans/short.npy: not a readable .npy array")  # fmt: skip
+    assert "good.npy" not in done.stdout
 
 
 def test_scans_that_are_no_images(place):

@@ -27,6 +27,31 @@ rule residual:
         "../scripts/analysis/residual.py"
 
 
+rule image_noise:
+    input:
+        specimen=f"{R}/geometry/specimen.json",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=expand(f"{R}/volumes/smooth{{state}}.h5", state=STATES),
+    output:
+        f"{R}/analysis/image_noise.json",
+    log:
+        f"{R}/logs/image_noise/all.log",
+    benchmark:
+        f"{R}/benchmarks/image_noise/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1000, 10.0),
+        runtime=10,
+    params:
+        code=code("analysis/image_noise.py"),
+        states=STATES,
+    script:
+        "../scripts/analysis/image_noise.py"
+
+
 rule field:
     input:
         meshes=[mesh_of(name) for name in RESULTS],
@@ -34,7 +59,7 @@ rule field:
         solutions=of_state("dvc/{mesh}_state{state}.h5", RESULTS),
         residuals=of_state("analysis/residual_{mesh}_state{state}.h5", RESULTS),
         threshold=f"{R}/geometry/threshold.json",
-        uncertainty=f"{R}/analysis/uncertainty.h5",
+        uncertainty=f"{R}/analysis/uncertainty_state{{state}}.h5",
     output:
         of_state("fields/{mesh}_state{state}.vtu", RESULTS),
     log:
@@ -110,7 +135,7 @@ if HAS_TRUTH:
         input:
             mesh=f"{R}/geometry/micro.vtu",
             field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
-            uncertainty=f"{R}/analysis/uncertainty.h5",
+            uncertainty=f"{R}/analysis/uncertainty_state{{state}}.h5",
             truth=TRUTH,
         output:
             f"{R}/analysis/uncertainty_truth_state{{state}}.json",
@@ -152,7 +177,7 @@ if HAS_TRUTH:
         params:
             code=code("analysis/struts_truth.py"),
             nu=config["micro"]["nu"],
-            names=[MICRO[0], FINEST],
+            results=STRUT_RESULTS,
         script:
             "../scripts/analysis/struts_truth.py"
 
@@ -295,12 +320,13 @@ rule noise_draws:
         shell=f"{R}/geometry/shell.h5",
         factor=f"{R}/dvc/{MICRO[0]}_factor.h5",
         threshold=f"{R}/geometry/threshold.json",
+        solution=f"{R}/dvc/{MICRO[0]}_state{{state}}.h5",
     output:
-        f"{R}/dvc/{MICRO[0]}_noise.h5",
+        f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
     log:
-        f"{R}/logs/noise_draws/all.log",
+        f"{R}/logs/noise_draws/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/noise_draws/all.tsv"
+        f"{R}/benchmarks/noise_draws/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -311,21 +337,22 @@ rule noise_draws:
         code=code("analysis/noise_draws.py"),
         blur=config["images"]["blur"],
         method=METHODS[MICRO[0]],
+        nu=config["micro"]["nu"],
     script:
         "../scripts/analysis/noise_draws.py"
 
 
 rule uncertainty:
     input:
-        noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
+        noise=f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
         struts=f"{R}/geometry/struts.h5",
     output:
-        arrays=f"{R}/analysis/uncertainty.h5",
-        figures=f"{R}/analysis/uncertainty.json",
+        arrays=f"{R}/analysis/uncertainty_state{{state}}.h5",
+        figures=f"{R}/analysis/uncertainty_state{{state}}.json",
     log:
-        f"{R}/logs/uncertainty/all.log",
+        f"{R}/logs/uncertainty/state{{state}}.log",
     benchmark:
-        f"{R}/benchmarks/uncertainty/all.tsv"
+        f"{R}/benchmarks/uncertainty/state{{state}}.tsv"
     conda:
         ENV
     threads: 1
@@ -338,9 +365,34 @@ rule uncertainty:
         "../scripts/analysis/uncertainty.py"
 
 
+rule strut_frame:
+    input:
+        solid=f"{R}/geometry/solid.h5",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/volume0.h5",
+        region=f"{R}/geometry/region.json",
+    output:
+        f"{R}/geometry/frame.h5",
+    log:
+        f"{R}/logs/strut_frame/all.log",
+    benchmark:
+        f"{R}/benchmarks/strut_frame/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 15.0),
+        runtime=60,
+    params:
+        code=code("analysis/strut_frame.py"),
+    script:
+        "../scripts/analysis/strut_frame.py"
+
+
 rule struts:
     input:
-        noise=f"{R}/dvc/{MICRO[0]}_noise.h5",
+        frame=f"{R}/geometry/frame.h5" if EQUILIBRIUM else [],
+        noise=f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
         struts=f"{R}/geometry/struts.h5",
         field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
         meso=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
@@ -355,14 +407,14 @@ rule struts:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1200, 10.0),
+        mem_mb=memory(1500, 15.0),
         runtime=60,
     params:
         code=code("analysis/struts.py"),
         nu=config["micro"]["nu"],
         micro=section("micro", "rotated"),
         method=METHODS[MICRO[0]],
-        names=[MICRO[0], FINEST],
+        results=STRUT_RESULTS,
     script:
         "../scripts/analysis/struts.py"
 
@@ -439,10 +491,10 @@ rule summary:
         else [],
         expand(
             f"{R}/{{name}}_state{{state}}.json",
-            name=["struts", "cells", "analysis/warp"],
+            name=["struts", "cells", "analysis/warp", "analysis/uncertainty"],
             state=STATES,
         ),
-        f"{R}/analysis/uncertainty.json",
+        f"{R}/analysis/image_noise.json",
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",

@@ -10,7 +10,7 @@ sys.path.insert(0, str(WORKFLOW / "src"))
 
 from addvc import config as settings
 from addvc import studies
-from addvc.errors import ConfigError
+from addvc.errors import AddvcError
 from addvc.provenance import code_hash
 
 SCHEMA = WORKFLOW / "schemas/config.schema.yaml"
@@ -30,13 +30,12 @@ def checked_config(config):
         settings.meso_names(config)
         settings.truth_file(config)
         studies.check(config, list(settings.state_labels(config)))
-        paths = (
-            [config["scans"]["reference"], *config["scans"]["states"]]
-            if "scans" in config
-            else []
-        )
-        return [settings.scan_files(path) for path in paths]
-    except ConfigError as error:
+        if "scans" in config and workflow.is_main_process:
+            from addvc.images.scans_check import check_headers  # slow to load
+
+            check_headers(config)
+        return [settings.scan_files(path) for path in settings.scan_paths(config)]
+    except AddvcError as error:
         raise WorkflowError(
             f"Configuration of case {config.get('case')}: {error}"
         ) from error
@@ -53,6 +52,12 @@ MESO = settings.meso_names(config)
 FINEST = MESO[-1]
 METHODS = settings.micro_names(config)
 MICRO = list(METHODS)
+EQUILIBRIUM = config["struts"]["equilibrium"]
+STRUT_RESULTS = {  # results that struts are measured on, and how their columns end
+    MICRO[0]: "",
+    **({f"{MICRO[0]}_raw": "_raw"} if EQUILIBRIUM else {}),
+    FINEST: "_meso",
+}
 RESULTS = [*MESO, *MICRO]  # all that is measured on, coarse to fine
 EARLIER = ["previous", "extrapolated", "composed"]  # starts that need the state before
 FREEFORM = ["freeform"] if "freeform" in config["meso"]["candidates"] else []
@@ -106,7 +111,7 @@ def scan_path(state):
     """The path of a scan as the configuration has it: a file, a folder or a pattern."""
     if own_scan(state):
         return f"{SCANS}/state{state}.tif"
-    return [config["scans"]["reference"], *config["scans"]["states"]][state]
+    return settings.scan_paths(config)[state]
 
 
 def scan_input(state):

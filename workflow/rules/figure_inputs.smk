@@ -2,6 +2,7 @@
 
 FIGURE_CASE = {"root": R, "labels": LABELS, "meso": MESO, "micro": MICRO}
 FIGURES = []
+ENTRIES = []  # of the page of captions, in the order of the rules
 CHAPTERS = {  # the order of the paper, then what is beyond it; snakemake sorts them
     "Specimen": "1 Specimen",
     "Meshes": "2 Meshes",
@@ -65,6 +66,12 @@ def struts_truth(suffix):
     return expand(name, state=STATES) if HAS_TRUTH else []
 
 
+def uncertainty():
+    """What the noise leaves uncertain in every state."""
+    name = f"{R}/analysis/uncertainty_state{{state}}.{{suffix}}"
+    return expand(name, state=STATES, suffix=["h5", "json"])
+
+
 def uncertainty_truth():
     """Errors against their uncertainty, where there is a truth."""
     name = f"{R}/analysis/uncertainty_truth_state{{state}}.json"
@@ -86,7 +93,21 @@ def shown(name, number, category, shows):
     """A figure or table of the report and of the list of all figures."""
     files = entry(name, number, category, shows)
     FIGURES.extend(map(str, files))
+    ENTRIES.append(
+        {
+            "file": Path(files[-1]).name,
+            "title": title(number, shows),
+            "caption": str(WORKFLOW / f"report/{number}.rst"),
+        }
+    )
     return files
+
+
+def title(number, shows):
+    """`Fig. 3: states`, of the paper; what it shows alone, beyond it."""
+    words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
+    words = words.replace("table", "Table ")
+    return shows if number.startswith("more") else f"{words}: {shows}"
 
 
 def entry(name, number, category, shows):
@@ -96,13 +117,11 @@ def entry(name, number, category, shows):
     figures snakemake's report would make a switch of the second label, and fail on it.
     """
     page = name.replace(".csv", ".html")
-    words = number.replace("fig0", "Fig. ").replace("fig", "Fig. ")
-    words = words.replace("table", "Table ") + ": "
     found = report(
         f"{R}/figures/{page}",
         category=CHAPTERS[category],
         caption=f"../report/{number}.rst",
-        labels={"figure": shows if number.startswith("more") else words + shows},
+        labels={"figure": title(number, shows)},
     )
     return [found] if page == name else [f"{R}/figures/{name}", found]
 

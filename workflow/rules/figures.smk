@@ -314,6 +314,7 @@ if STATES:
     rule fig10:
         input:
             SPECIMEN,
+            smooth(0),
             meshes(*MESO),
             solutions(*MESO),
         output:
@@ -367,6 +368,7 @@ if STATES:
 
     rule fig12:
         input:
+            f"{R}/analysis/image_noise.json",
             residuals(FINEST, *MICRO),
             solutions(FINEST, *MICRO),
             fields(*MICRO),
@@ -550,11 +552,10 @@ if STATES:
             SPECIMEN,
             smooth(0),
             meshes("micro"),
-            solutions(MICRO[0]),
+            solutions(FINEST, MICRO[0]),
             fields(MICRO[0]),
             f"{R}/geometry/struts.h5",
-            f"{R}/analysis/uncertainty.h5",
-            f"{R}/analysis/uncertainty.json",
+            uncertainty(),
             uncertainty_truth(),
         output:
             shown("more_uncertainty.png", "more_uncertainty", "Quality", "uncertainty"),
@@ -683,6 +684,34 @@ if STATES:
             case=FIGURE_CASE,
         script:
             "../scripts/figures/more_warp.py"
+
+
+if STATES and settings.chooses(config["micro"], METHODS[MICRO[0]]):
+
+    rule more_cutoff:
+        input:
+            SPECIMEN,
+            smooth(0),
+            solutions(MICRO[0]),
+            fields(MICRO[0]),
+        output:
+            shown("more_cutoff.png", "more_cutoff", "Quality", "choice of l_E"),
+            drawing("more_cutoff"),
+        log:
+            f"{R}/logs/figures/more_cutoff.log",
+        benchmark:
+            f"{R}/benchmarks/figures/more_cutoff.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(600, 1.0),
+            runtime=10,
+        params:
+            code=code("figures/more_cutoff.py"),
+            case=FIGURE_CASE,
+        script:
+            "../scripts/figures/more_cutoff.py"
 
 
 if STATES and HAS_TRUTH:

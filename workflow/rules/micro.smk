@@ -161,11 +161,13 @@ rule micro_dvc:
     params:
         code=code("micro/micro_dvc.py"),
         method=method_of,
+        blur=config["images"]["blur"],
         micro=section(
             "micro",
             "tolerance",
             "max_iterations",
             "nu",
+            "l_e",
             "robust",
             "rotated",
             "stages",
@@ -177,6 +179,7 @@ rule micro_dvc:
 
 rule micro_ultimate_error:
     input:
+        **({"solution": f"{R}/dvc/{{micro}}_state{STATES[0]}.h5"} if STATES else {}),
         mesh=f"{R}/geometry/micro.vtu",
         shell=f"{R}/geometry/shell.h5",
         reference=f"{R}/volumes/smooth0.h5",
@@ -197,6 +200,7 @@ rule micro_ultimate_error:
     params:
         code=code("micro/ultimate_error.py"),
         method=method_of,
+        nu=config["micro"]["nu"],
         ultimate_error=config["ultimate_error"],
         images=section("images", "blur"),
     script:

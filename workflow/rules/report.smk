@@ -5,9 +5,14 @@ LOOK_AROUND = [
     *([f"{R}/scene.html"] if STATES else []),
 ]
 
+CAPTIONS = sorted(map(str, (WORKFLOW / "report").glob("*.rst")))
 
+
+# Its commit is that of the last thing the report shows that was made.
 rule front_page:
     input:
+        FIGURES,
+        CAPTIONS,
         summary=f"{R}/summary.json",
         scans=f"{R}/input.json",
         hashes=f"{R}/input_hashes.json",
@@ -82,6 +87,28 @@ if STATES:
             "../scripts/report/scene.py"
 
 
+rule captions:
+    input:
+        CAPTIONS,
+    output:
+        f"{R}/figures/captions.md",
+    log:
+        f"{R}/logs/captions/all.log",
+    benchmark:
+        f"{R}/benchmarks/captions/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(600),
+        runtime=5,
+    params:
+        code=code("report/captions.py"),
+        entries=ENTRIES,
+    script:
+        "../scripts/report/captions.py"
+
+
 rule figures:
     input:
         FIGURES,
@@ -95,7 +122,7 @@ rule report:
         page=f"{R}/report/front.rst",
         config=f"{R}/report/config.json",
         stylesheet=str(WORKFLOW / "report/report.css"),
-        captions=sorted(map(str, (WORKFLOW / "report").glob("*.rst"))),
+        captions=CAPTIONS,
     output:
         f"{R}/report.html",
     log:

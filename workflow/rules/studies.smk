@@ -164,10 +164,12 @@ if STATES:
             f"{V_TIMES}/micro_dvc_state{{state}}.tsv"
         params:
             method=method_of_variant,
+            blur=config["images"]["blur"],
             micro=changed(
                 "tolerance",
                 "max_iterations",
                 "nu",
+                "l_e",
                 "robust",
                 "rotated",
                 "stages",

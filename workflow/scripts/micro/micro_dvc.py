@@ -1,7 +1,7 @@
 """Micro DVC of one state by one method, from the best start on the micro mesh."""
 
 from addvc.correlation.corotational import Problem, corotational
-from addvc.correlation.micro import mending, micro_reference, shell_of, stages
+from addvc.correlation.micro import ladder, mending, micro_reference, shell_of, stages
 from addvc.correlation.register import Stop, System, register
 from addvc.correlation.store import load_factor, load_field, load_order, save_solution
 from addvc.fem.io import read_mesh
@@ -21,8 +21,9 @@ with job(snakemake):
         solution = register(System(reference, extra, factor), deformed, start, stop, "micro DVC")
     else:
         order, notes = load_order(source.factor)
-        problem = Problem(reference, notes["c"], micro["nu"], order)
-        levels = read_json(source.threshold)
+        problem = Problem(reference, notes["c"], micro["nu"], notes["l_e"], order)
+        levels, blur = read_json(source.threshold), snakemake.params.blur
         plan = stages(micro, levels, method), mending(micro, levels)
-        solution, notes["stages"] = corotational(problem, deformed, start, *plan)
+        cutoffs = ladder(micro, levels, blur, method)
+        solution, notes = corotational(problem, deformed, start, *plan, cutoffs)
     save_solution(snakemake.output[0], solution, **notes)

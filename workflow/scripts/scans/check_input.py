@@ -1,7 +1,8 @@
 """All scans, before any work: there, whole, of one shape."""
 
 from addvc.images.files import write_json
-from addvc.images.scans import ScanFormat, check_scans
+from addvc.images.scans import ScanFormat
+from addvc.images.scans_check import check_scans
 from addvc.runtime import job
 
 with job(snakemake):

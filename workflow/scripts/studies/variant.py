@@ -16,7 +16,8 @@ with job(snakemake) as log:
     options = micro_options(params.micro, read_json(source.cell_size)["cell_size"], params.axis)
     row = params.change | {"state": int(snakemake.wildcards.state)}
     row["settings"] = settings(options, levels["threshold"], params.mesh["size"])
-    solution, residual = load_solution(source.solution)[0], load_residual(source.residual)
+    (solution, notes), residual = load_solution(source.solution), load_residual(source.residual)
+    row["settings"]["l_e"] = notes.get("l_e", options.l_e)
     mesh, penalised = Mesh(points, cells), classes["penalised"] > 0
     row |= variant_figures(mesh, penalised, options, solution, residual, levels["noise"])
     figures = read_json(source.figures)

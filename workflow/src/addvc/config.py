@@ -136,6 +136,12 @@ def meso_size(config: dict, name: str, cell_size: float) -> float:
     return size if "sizes" in config["meso"] else size * cell_size / NOMINAL_CELL
 
 
+def chooses(section: dict, method: str) -> bool:
+    """Whether the images choose l_E for a method; section: `micro`."""
+    given = section["l_e"] != "auto" or "l_e" in section.get("times", {})
+    return not given and section["stages"] > 1 and method not in ("eq10", "without_choice")
+
+
 def micro_names(config: dict) -> dict[str, str]:
     """Result name -> method of micro DVC; `micro` is the first method of micro.methods."""
     first, *others = config["micro"]["methods"]
@@ -191,6 +197,13 @@ def check_values(config: dict, schema: dict) -> None:
     key = ".".join(map(str, error.absolute_path)) or "the configuration"
     meaning = error.schema.get("description", "see config/README.md")
     raise ConfigError(f"`{key}`: {error.message}. {meaning}")
+
+
+def scan_paths(config: dict) -> list[str]:
+    """The scans of the user's own, as the configuration has them: the reference, then the states."""
+    if "scans" not in config:
+        return []
+    return [config["scans"]["reference"], *config["scans"]["states"]]
 
 
 def scan_files(path: str) -> list[str]:

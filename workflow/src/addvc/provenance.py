@@ -62,6 +62,15 @@ def code_hash(script: str | Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def folder_hash(folder: Path, suffixes: tuple[str, ...] = (".py", ".smk", ".yaml")) -> str:
+    """Hash of all files of a folder with these suffixes, names included: for what runs a workflow as a
+    whole."""
+    digest = hashlib.sha256()
+    for file in sorted(path for path in folder.rglob("*") if path.suffix in suffixes):
+        digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 def commit(folder: Path = PACKAGE) -> str:
     """The commit that a folder of a Git repository is at, with "-dirty" when files of it have been
     changed since; "unknown" where there is no repository, or no git."""

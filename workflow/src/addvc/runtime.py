@@ -19,7 +19,8 @@ def job_name(rule: str, wildcards: dict) -> str:
 
 @contextlib.contextmanager
 def job(snakemake) -> Iterator[logging.Logger]:
-    """Progress to the terminal and to the log of the job; threads as the scheduler gave them.
+    """Progress to the log of the job and, from the level ADDVC_LOG (INFO) on, to the terminal; threads
+    as the scheduler gave them.
 
     An error the user can mend (AddvcError) is told in one paragraph and ends the job with status 1;
     any other keeps its traceback, which goes to the log as well."""
@@ -29,7 +30,9 @@ def job(snakemake) -> Iterator[logging.Logger]:
     name = job_name(snakemake.rule, dict(snakemake.wildcards.items()))
     log = logging.getLogger("addvc")
     log.setLevel(logging.INFO)
-    handlers = [logging.FileHandler(path, mode="w"), logging.StreamHandler(sys.stderr)]
+    terminal = logging.StreamHandler(sys.stderr)
+    terminal.setLevel(os.environ.get("ADDVC_LOG", "INFO"))
+    handlers = [logging.FileHandler(path, mode="w"), terminal]
     for handler in handlers:
         handler.setFormatter(logging.Formatter(f"%(asctime)s [{name}] %(message)s", "%H:%M:%S"))
         log.addHandler(handler)

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 from addvc.config import micro_names
 from addvc.errors import ConfigError
 
-ABLATION = ("corotational", "without_shell", "without_rotation", "without_robust", "eq10")
+ABLATION = (
+    "corotational",
+    "without_shell",
+    "without_rotation",
+    "without_robust",
+    "without_choice",
+    "eq10",
+)
 
 EQ10 = ("l_k", "l_l")
 """Parameters of the paper's method."""

@@ -48,8 +48,9 @@ MECHANICS = {
 }
 """Columns of each displacement, with unit and meaning."""
 
-MESO = "_meso"
-"""Added to the names of the columns that the finest meso mesh gives."""
+MESO, RAW = "_meso", "_raw"
+"""Added to the names of the columns that the finest meso mesh gives, and of those that micro DVC gives
+before the filter by equilibrium."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,7 +56,6 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
         "threshold": threshold["threshold"],
         "porosity": threshold["porosity"],
         "noise": threshold["noise"],
-        "uncertainty": read("analysis/uncertainty.json"),
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in scope.meshes},
         "topology": read("geometry/topology.json")["counts"],
@@ -108,8 +107,10 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
         "freeform": freeform_figures(folder, state, scope.truth) if scope.freeform else None,
         "verdict": verdict(best["converged"], best["valid_nodes"]),
         "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
+        "uncertainty": read_json(folder / f"analysis/uncertainty_state{state}.json"),
         "warp": read_json(folder / f"analysis/warp_state{state}.json"),
         "cells": read_json(folder / f"cells_state{state}.json")["localisation"],
+        "noise_std": read_json(folder / "analysis/image_noise.json")[str(state)],
     }
 
 
@@ -121,6 +122,7 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
     _, _, point, _ = read_vtu(folder / f"fields/{name}.vtu")
     return {
         "start": notes.get("best"),
+        "l_e": notes.get("l_e"),
         "converged": solution.converged,
         "iterations": solution.iterations,
         "last_step": solution.history[-1],

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial
 from addvc.correlation.doubt import doubtful_nodes, without
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.metric import Reference, hessian, turned
@@ -36,6 +37,12 @@ EARLY = 10
 
 EARLY_MOST = 10
 """Iterations of such a stage, at most: its rotations are not the last ones."""
+
+FAR = 2
+"""Rungs of the ladder of l_E that one linear step is trusted for."""
+
+ROUNDS = 3
+"""Stages at most to choose l_E in."""
 
 
 @dataclass(frozen=True)
@@ -54,17 +61,23 @@ def early(last: Stop) -> Stop:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What all states share: I_r on struts and shell, c of the energy, nu, order of elimination."""
+    """What all states share: I_r on struts and shell, c of the energy and the l_E (voxels) that it
+    stands for, nu, order of elimination."""
 
     reference: Reference
     weight: float
     nu: float
+    cutoff: float = 1.0
     order: np.ndarray | None = None
     smoothing: int = 4
 
+    def cut_off(self, times: float) -> "Problem":
+        """With `times` the l_E: c goes with its square (`regularisation.elastic_weight`)."""
+        return replace(self, weight=self.weight * times**2, cutoff=self.cutoff * times)
 
-def stage_system(problem: Problem, stage: Stage, u: np.ndarray) -> System:
-    """The system of a stage that starts from u (n, 3), with the rotations of u.
+
+def stage_system(problem: Problem, stage: Stage, u: np.ndarray | None) -> System:
+    """The system of a stage that starts from u (n, 3), with the rotations of u where it is rotated.
 
     H has no robust weights: they only fall from one, so that A then bounds the curvature from above
     and each step goes down. With the weights of u in H, points whose residual fell during the stage
@@ -99,14 +112,20 @@ def corotational(
     u: np.ndarray,
     stages: Sequence[Stage],
     mending: Mending | None = None,
-) -> tuple[Solution, list[dict]]:
+    ladder: Ladder | None = None,
+) -> tuple[Solution, dict]:
     """Stages one after the other from u (n, 3); I_d by its spline coefficients (nx, ny, nz).
 
-    Mending comes between the others and the last stage, in which what is then in doubt does not
-    count. The solution has the history of all stages and converged if the last one did; a row of
-    figures for each stage."""
+    After the first of several, l_E is chosen where there is a ladder. Mending comes between the others
+    and the last stage, in which what is then in doubt does not count. The solution has the history of
+    all stages and converged if the last one did; of the notes, `stages` has a row of figures for each,
+    `c` and `l_e` are the weight of the energy and its cut-off in the end, `risk` the trials of l_E, all
+    in grey levels^2 over the points."""
     *early, last = stages
     done: list[tuple[Solution, dict]] = []
+    trials: list[dict] = []
+    if ladder is not None and early:
+        problem, u, done, trials = with_cutoff(problem, deformed, u, early.pop(0), ladder)
     for stage in early:
         done.append(run(problem, stage, deformed, u))
         u = done[-1][0].u
@@ -121,14 +140,42 @@ def corotational(
     solutions, rows = zip(*done, strict=True)
     history = [step for solution in solutions for step in solution.history]
     seconds = sum(solution.seconds for solution in solutions)
-    return replace(solutions[-1], history=history, seconds=seconds), list(rows)
+    notes = {"stages": list(rows), "c": problem.weight, "l_e": problem.cutoff, "risk": trials}
+    return replace(solutions[-1], history=history, seconds=seconds), notes
+
+
+def with_cutoff(
+    problem: Problem, deformed: np.ndarray, u: np.ndarray, stage: Stage, ladder: Ladder
+) -> tuple[Problem, np.ndarray, list[tuple[Solution, dict]], list[dict]]:
+    """The problem with the l_E of least risk, u by it, the stages that it took, and the trials.
+
+    One linear step tells the risk only so far: from far off the stage is run again with the new l_E."""
+    done, rung = [], 0
+    while True:
+        system = stage_system(problem, stage, u)
+        done.append(run(problem, stage, deformed, u, system=system))
+        if not np.isfinite(done[-1][0].history[-1]):
+            return problem, u, done, []
+        u = done[-1][0].u
+        best, trials = least_risk(trial(system, deformed, u, ladder), ladder, rung)
+        trials = [row | {"l_e": row["times"] * problem.cutoff} for row in trials]
+        problem = problem.cut_off(RATIO ** (best - rung))
+        log.info("micro DVC: least risk at l_E = %.3g voxels", problem.cutoff)
+        if abs(best - rung) <= FAR or len(done) == ROUNDS:
+            return problem, u, done, trials
+        rung = best
 
 
 def run(
-    problem: Problem, stage: Stage, deformed: np.ndarray, u: np.ndarray, name: str = "micro DVC"
+    problem: Problem,
+    stage: Stage,
+    deformed: np.ndarray,
+    u: np.ndarray,
+    name: str = "micro DVC",
+    system: System | None = None,
 ) -> tuple[Solution, dict]:
-    """One stage from u (n, 3), and its row of figures."""
-    system = stage_system(problem, stage, u)
+    """One stage from u (n, 3), and its row of figures; `system`: its own, where it is known."""
+    system = stage_system(problem, stage, u) if system is None else system
     solution = register(system, deformed, u, stage.stop, name)
     return solution, {
         "stage": name,

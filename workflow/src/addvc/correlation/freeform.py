@@ -55,8 +55,8 @@ class Level:
     most: int = 40
 
 
-# Coarse levels to 0.01, fine ones to the last iteration, solvers to 0.01 in 200 steps take 2.4 times as
-# long for the same rms error on the twin, to .001 voxel (.006 at 28.5 %).
+# Coarse levels to 0.01, fine ones to the last iteration, solvers to 0.01 in 200 steps: the rms error
+# on the twin was the same to .001 voxel (.006 at 28.5 %), in 2.4 times as long.
 LEVELS = (
     Level(32, 3.0, 16, 2, 4, 6),
     Level(16, 3.0, 10, 2, 4, 10, 0.02),

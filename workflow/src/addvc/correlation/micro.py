@@ -6,15 +6,20 @@ in a frame that turns with the struts (`correlation.corotational`).
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 
-from addvc.correlation.corotational import Mending, Stage, early
+from addvc.config import chooses
+from addvc.correlation.corotational import Mending, Problem, Stage, early, stage_system
+from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import residual_limit
 from addvc.correlation.metric import Reference, hessian, reference_on
-from addvc.correlation.register import Stop
+from addvc.correlation.register import Stop, System
 from addvc.correlation.regularisation import elastic_weight, equilibrium_gap
+from addvc.correlation.store import load_factor, load_notes, load_order
+from addvc.correlation.uncertainty import Noise
 from addvc.fem.assembly import node_pattern
 from addvc.fem.mesh import Mesh
 from addvc.fem.operators import stiffness
@@ -43,7 +48,8 @@ def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
     sizes give median errors of .13 / .10 / .09 voxel at 3.4 %. Where a cell has many voxels
     (trabecular bone: 84) the noise, not the cell, asks for smoothing, and less of it: 20 / 56 / 168
     voxels gave .06 / .10 / .22 voxel on a wavy field. "auto" of l_E: 0.8 cell size, at most 0.7
-    periods. `times`, where given: factors on some of them (`addvc.studies`)."""
+    periods, to begin with: the images then choose (`ladder`). `times`, where given: factors on some
+    of them (`addvc.studies`)."""
     longest = min(2 * cell_size, 1.6 * section["period"])
     auto = {"l_k": longest, "l_l": longest, "l_e": min(0.8 * cell_size, 0.7 * section["period"])}
     times = section.get("times", {})
@@ -88,7 +94,21 @@ def elastic(
     h, k = hessian(reference, pattern).tocsr(), stiffness(reference.mesh, options.nu, pattern)
     c = elastic_weight(reference.mesh, h, k, options.l_e, options.period, options.axis)
     extra = (c * k).tocsr()
-    return h + extra, extra, {"c": c}
+    return h + extra, extra, {"c": c, "l_e": options.l_e}
+
+
+def system_at_rest(
+    reference: Reference, method: str, nu: float, factor: str | Path, solution: str | Path | None
+) -> System:
+    """The system of a method before any turning, from what `factor` holds; with the weight of the
+    elastic energy that `solution` was found with, where there is one."""
+    if method == "eq10":
+        known, extra, _ = load_factor(factor)
+        return System(reference, extra, known)
+    order, weights = load_order(factor)
+    c = (weights if solution is None else load_notes(solution))["c"]
+    problem = Problem(reference, c, nu, order=order)
+    return stage_system(problem, Stage(rotated=False), None)
 
 
 def shell_of(method: str, shell: Quadrature) -> Quadrature | None:
@@ -121,6 +141,12 @@ def stages(section: dict, levels: dict, method: str = "corotational") -> list[St
     last = Stop(section["tolerance"], section["max_iterations"])
     ends = [early(last)] * (section["stages"] - 1) + [last]
     return [Stage(rotated, scale, end) for end in ends]
+
+
+def ladder(section: dict, levels: dict, blur: float, method: str) -> Ladder | None:
+    """What l_E is chosen from, from the `micro` section and the noise of the grey `levels` after the
+    pre-filter `blur` (voxels); None where it is given, or there is no stage to choose it in."""
+    return Ladder(Noise(levels["noise"], blur)) if chooses(section, method) else None
 
 
 def mending(section: dict, levels: dict) -> Mending | None:

@@ -45,40 +45,48 @@ def register(
     system: System, deformed: np.ndarray, u: np.ndarray, stop: Stop, name: str = "DVC"
 ) -> Solution:
     """Eq. 3 for I_d given by its spline coefficients (nx, ny, nz), from u (n, 3)."""
-    reference = system.reference
-    sigma = {}
+    downhill = Downhill(system, deformed)
 
-    def downhill(field_):
-        r, inside = residual(reference, deformed, field_)
-        sigma["now"] = residual_statistics(r, inside, reference.quadrature.weight)["std"]
-        if system.scale is not None:
-            r = r * geman_mcclure(r, system.scale)
-        b = right_hand_side(reference, r)
-        if system.load is not None:
-            b -= system.load
-        if system.regularisation is not None:
-            b -= system.regularisation @ field_.ravel()
-        return b
-
-    def progress(iteration, step):
-        log.info(
-            "%s: iteration %d, rms(du) %.2e voxel, sigma(r) %.3f before it",
-            name,
-            iteration,
-            step,
-            sigma["now"],
-        )
+    def progress(iteration: int, step: float) -> None:
+        words = "%s: iteration %d, rms(du) %.2e voxel, sigma(r) %.3f before it"
+        log.info(words, name, iteration, step, downhill.sigma)
 
     solution = gauss_newton(
         downhill, system.factor.solve, u, stop.tolerance, stop.max_iterations, progress
     )
-    r, inside = residual(reference, deformed, solution.u)
-    statistics = residual_statistics(r, inside, reference.quadrature.weight)
-    log.info(
-        "%s: %s after %d iterations, sigma(r) %.3f",
-        name,
-        "converged" if solution.converged else "NOT converged",
-        solution.iterations,
-        statistics["std"],
-    )
+    r, inside = residual(system.reference, deformed, solution.u)
+    statistics = residual_statistics(r, inside, system.reference.quadrature.weight)
+    log.info("%s: %s, sigma(r) %.3f", name, ending(solution, stop), statistics["std"])
     return replace(solution, residual=statistics)
+
+
+class Downhill:
+    """b(u) (3 n,), Eq. 5 less what the regularisation holds against; `sigma`: standard deviation of the
+    residual at the last u, grey levels."""
+
+    def __init__(self, system: System, deformed: np.ndarray) -> None:
+        self.system, self.deformed, self.sigma = system, deformed, np.nan
+
+    def __call__(self, u: np.ndarray) -> np.ndarray:
+        system = self.system
+        r, inside = residual(system.reference, self.deformed, u)
+        self.sigma = residual_statistics(r, inside, system.reference.quadrature.weight)["std"]
+        if system.scale is not None:
+            r = r * geman_mcclure(r, system.scale)
+        b = right_hand_side(system.reference, r)
+        if system.load is not None:
+            b -= system.load
+        if system.regularisation is not None:
+            b -= system.regularisation @ u.ravel()
+        return b
+
+
+def ending(solution: Solution, stop: Stop) -> str:
+    """How a loop ended. What a limit of iterations means is the caller's to tell: a start on trial is
+    not meant to converge."""
+    if solution.converged:
+        return f"converged after {solution.iterations} iterations"
+    return (
+        f"stopped after {solution.iterations} iterations, rms(du) {solution.history[-1]:.1e} voxel "
+        f"(criterion {stop.tolerance:.0e})"
+    )

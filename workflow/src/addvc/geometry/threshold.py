@@ -71,11 +71,16 @@ def void_noise(smooth: np.ndarray, mask: np.ndarray, gamma: float, away: int = 3
     """Noise of the void at least `away` voxels from any solid, whose blurred halo is no noise.
 
     1.48 times the median absolute deviation; None where less than 1 % of the mask is that far."""
-    void = mask & ~ndimage.binary_dilation(smooth >= gamma, iterations=away)
+    void = mask & far_void(smooth, gamma, away)
     if void.sum() < 0.01 * mask.sum():
         return None
     grey = smooth[void]
     return 1.4826 * float(np.median(np.abs(grey - np.median(grey))))
+
+
+def far_void(smooth: np.ndarray, gamma: float, away: int = 3) -> np.ndarray:
+    """Voxels (nx, ny, nz) at least `away` voxels from any solid, bool."""
+    return ~ndimage.binary_dilation(smooth >= gamma, iterations=away)
 
 
 def find_threshold(smooth: np.ndarray, specimen, porosity: float, setting: str | float) -> dict:

@@ -4,7 +4,6 @@ A volume is I[i, j, k] with x = i, y = j, z = k at voxel centres, whatever the o
 """
 
 import glob
-import hashlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -31,7 +30,6 @@ __all__ = [
     "Scan",
     "ScanError",
     "ScanFormat",
-    "check_scans",
     "load_volume",
     "open_scan",
     "read_binned",
@@ -48,7 +46,6 @@ OPENERS: dict[str, Callable[[Path, ScanFormat], Source]] = {
 }
 MIN_SIZE = 16  # voxels in each direction after binning
 SLAB_VOXELS = 2**24  # read at once: 64 MB as float32
-FINGERPRINT_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -74,18 +71,20 @@ class Scan:
         return self.source.read(start, stop).transpose(_to_xyz(self.axes))
 
 
-def open_scan(path: str | os.PathLike, fmt: ScanFormat | None = None) -> Scan:
+def open_scan(
+    path: str | os.PathLike, fmt: ScanFormat | None = None, every_slice: bool = True
+) -> Scan:
     """Open a TIFF, raw, .npy or HDF5 file, a folder of TIFF slices or a pattern of their names.
 
-    Reads headers only. Raises ScanError when it is missing, unknown, truncated, not
-    three-dimensional or not of real grey values.
+    Reads headers only; of slices, that of each, or of the first and last. Raises ScanError when it
+    is missing, unknown, truncated, not three-dimensional or not of real grey values.
     """
     path, fmt = Path(path), fmt or ScanFormat()
     if sorted(fmt.axes) != ["x", "y", "z"]:
         raise ScanError(
             f"axes is '{fmt.axes}'; use a permutation of 'xyz', slowest first, such as 'zyx'"
         )
-    source = _open_source(path, fmt)
+    source = _open_source(path, fmt, every_slice)
     if len(source.shape) != 3:
         raise ScanError(f"{path}: has {len(source.shape)} dimensions, {source.shape}; 3 are needed")
     if source.dtype.kind not in "buif":
@@ -99,16 +98,17 @@ def _to_xyz(axes: str) -> tuple[int, ...]:
     return tuple(axes.index(name) for name in "xyz")
 
 
-def _open_source(path: Path, fmt: ScanFormat) -> Source:
+def _open_source(path: Path, fmt: ScanFormat, every_slice: bool) -> Source:
     """Choose the opener by what the path is: a pattern, a folder, or a file with a suffix."""
     if is_pattern(path):
-        return open_stack([Path(file) for file in glob.glob(str(path))], str(path))
+        return open_stack([Path(file) for file in glob.glob(str(path))], str(path), every_slice)
     if not path.exists():
         where = "an absolute path" if path.is_absolute() else f"relative to {Path.cwd()}"
         raise ScanError(f"{path}: no such file or folder ({where}); correct the path")
     if path.is_dir():
         files = [file for file in path.iterdir() if file.suffix.lower() in TIFF_SUFFIXES]
-        return open_stack([file for file in files if not file.name.startswith(".")], str(path))
+        files = [file for file in files if not file.name.startswith(".")]
+        return open_stack(files, str(path), every_slice)
     opener = OPENERS.get(path.suffix.lower())
     if opener is None:
         known = ", ".join(OPENERS)
@@ -227,37 +227,3 @@ class _Seen:
                 f"{self.scan.path}: every voxel is {self.low}; an image with structure is needed: "
                 "check the file, and shape, dtype and crop if given"
             )
-
-
-def check_scans(
-    paths: Sequence[str | os.PathLike], fmt: ScanFormat | None, factor: int = 1, crop: Crop = None
-) -> list[dict]:
-    """Open every scan (headers only) and compare sizes: a cheap check before any work.
-
-    Gives for each: path, shape and binned_shape (x, y, z), dtype, bytes on disk, and fingerprint,
-    a sha256 of the first MB and the size. The fingerprint tells scans apart in a record of
-    provenance; it is no checksum, since a change behind the first MB leaves it as it is.
-    """
-    scans = [open_scan(path, fmt) for path in paths]
-    for scan in scans:
-        if scan.shape != scans[0].shape:
-            raise ScanError(
-                f"{scan.path} has {scan.shape} voxels, but {scans[0].path} has {scans[0].shape}; "
-                "all states must have one size: crop or export them alike"
-            )
-    return [_record(scan, factor, crop) for scan in scans]
-
-
-def _record(scan: Scan, factor: int, crop: Crop) -> dict:
-    """What check_scans says of one scan."""
-    size = sum(file.stat().st_size for file in scan.source.files)
-    with open(scan.source.files[0], "rb") as file:
-        digest = hashlib.sha256(file.read(FINGERPRINT_BYTES) + str(size).encode())
-    return {
-        "path": str(scan.path),
-        "shape": list(scan.shape),
-        "binned_shape": list(binned_shape(scan, factor, crop)),
-        "dtype": str(scan.dtype),
-        "bytes": size,
-        "fingerprint": digest.hexdigest(),
-    }

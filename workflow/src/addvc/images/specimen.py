@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from addvc.errors import GeometryError
 from addvc.images.levels import bin_mean, to_fine
+from addvc.images.orientation import check_no_platens_elsewhere, check_outline
 from addvc.images.platens import find_platens
 from addvc.images.silhouette import (
     Rectangle,
@@ -50,6 +51,14 @@ class Specimen:
         """The two axes across the loading axis."""
         first, second = (axis for axis in range(3) if axis != self.axis)
         return first, second
+
+    @property
+    def widest(self) -> Rectangle:
+        """Two (low, high) across the axis, between which all of it lies."""
+        if self.bounds is not None:
+            return self.bounds
+        a, b = ((x - self.radius, x + self.radius) for x in self.centre)
+        return a, b
 
     def inside(self, points: NDArray, margin: float = 0.0) -> NDArray[np.bool_]:
         """points (n, 3) -> (n,): inside, at least `margin` from every face (negative: beyond)."""
@@ -102,12 +111,22 @@ def find_specimen(
     platens: 'auto', 'none' (the ends of the image) or [low, high]. specimen: 'auto', 'cylinder' or
     'box'; auto says box where the solid fills the corners of the image or outlines a rectangle
     better than a disc. threshold: grey level of the solid, by default Otsu's between the platens,
-    of an image binned by two against noise. Raises GeometryError when there is no solid, or no
-    room between the platens.
+    of an image binned by two against noise. Raises GeometryError when there is no solid, no room
+    between the platens, or when `axis` cannot be the loading axis.
     """
     if specimen not in ("auto", "cylinder", "box"):
         raise GeometryError(f"specimen is '{specimen}'; use auto, cylinder or box")
-    low, high = platen_faces(volume, axis, platens)
+    faces = platen_faces(volume, axis, platens)
+    found = _within(volume, axis, faces, specimen, threshold)
+    check_outline(found.widest, volume.shape, axis)
+    return found
+
+
+def _within(
+    volume: NDArray, axis: int, faces: tuple[float, float], specimen: str, threshold: float | None
+) -> Specimen:
+    """The specimen between two faces, as `find_specimen` has it."""
+    low, high = faces
     factor = BIN if threshold is None else 1
     rows = bin_mean(_rows_between(volume, axis, low, high), factor)
     outline = _outline(rows, threshold)
@@ -153,7 +172,10 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
     if not isinstance(platens, str):
         low, high = _given_faces(platens, n)
     elif platens == "auto":
-        low, high = find_platens(volume, axis) or (low, high)
+        found = find_platens(volume, axis)
+        if found is None:
+            check_no_platens_elsewhere(volume, axis)
+        low, high = found or (low, high)
     elif platens != "none":
         raise GeometryError(f"platens is '{platens}'; use auto, none or [LOW, HIGH]")
     if high - low < MIN_ROWS:

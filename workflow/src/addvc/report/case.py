@@ -9,7 +9,7 @@ import numpy as np
 
 from addvc.analysis.validity import verdict
 from addvc.correlation.gauss_newton import Solution
-from addvc.correlation.store import load_solution
+from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_mesh, read_vtu
 from addvc.fem.mesh import Mesh
 from addvc.images.files import read_json
@@ -103,6 +103,14 @@ class Case:
 
     def solution(self, mesh: str, state: int) -> Solution:
         return load_solution(self.path(f"dvc/{mesh}_state{state}.h5"))[0]
+
+    def cutoff(self, mesh: str, state: int) -> float:
+        """l_E (voxels) of a micro result of the default kind."""
+        return float(self.notes(mesh, state)["l_e"])
+
+    def notes(self, mesh: str, state: int) -> dict:
+        """What was noted with a solution."""
+        return load_notes(self.path(f"dvc/{mesh}_state{state}.h5"))
 
     def displacement(self, mesh: str, state: int) -> np.ndarray:
         """u (n, 3) in voxels at the nodes of the micro mesh, of a micro or a meso result."""

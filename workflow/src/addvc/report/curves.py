@@ -1,10 +1,10 @@
-"""Fig. 4 and 12, and beyond the paper: convergence of every mesh, errors against a truth."""
+"""Fig. 4, 12; beyond the paper: convergence of every mesh, choice of l_E, errors against a truth."""
 
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from addvc.report import style
 from addvc.report.case import Case
@@ -49,7 +49,8 @@ def _autocorrelation(ax: Axes, found: dict, voxel_um: float) -> None:
 
 
 def histograms(case: Case, outputs: Iterable[str]) -> None:
-    """Fig. 12: density of r over the struts, all states: finest meso mesh, each micro method."""
+    """Fig. 12: density of r over the struts, all states, beside that of noise alone: finest meso mesh,
+    each micro method."""
     names = [case.finest, *case.micro]
     fig = style.figure(92)
     axes = fig.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
@@ -57,29 +58,48 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
     for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
         for state in case.states:
             _density(ax, case, name, state, reach)
+        _noise_alone(ax, case, reach)
         kind = "mesoscale" if name == case.finest else "microscale"
         style.headline(ax, f"{kind} ({name})", number)
         ax.set_xlabel("residual r (grey levels)")
         ax.xaxis.set_major_locator(MaxNLocator(5))
-        ax.legend(loc="upper left", handlelength=1.2, borderaxespad=0.1, fontsize=7)
+        ax.legend(loc="upper left", handlelength=1.4, borderaxespad=0.1, fontsize=7)
     low, high = axes[0].get_ylim()
     axes[0].set(
         ylabel="density (1 / grey level)",
         xlim=(-reach, reach),
-        ylim=(low, low + (high - low) * (1.05 + 0.13 * len(case.states))),
+        ylim=(low, low + (high - low) * (1.1 + 0.07 * (len(case.states) + 1))),
     )
+    fig.legend(handles=_state_handles(case), loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 
 
+def _state_handles(case: Case) -> list:
+    """A line a state, with what became of it by the default micro method."""
+    titles = {n: case.title(n, case.micro[0]) for n in case.states}
+    return [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
+
+
+def _noise_alone(ax: Axes, case: Case, reach: float) -> None:
+    """The normal distribution that noise alone would give, of the state that has most of it."""
+    known = [std for std in case.json("analysis/image_noise.json").values() if std is not None]
+    if not known:
+        return
+    r, std = np.linspace(-reach, reach, 400), max(known)
+    density = np.exp(-0.5 * (r / std) ** 2) / (std * np.sqrt(2 * np.pi))
+    label = f"noise alone, σ = {std:.2f}"
+    ax.plot(r, density, color=style.DARK, ls=":", lw=1, label=label, zorder=1)
+
+
 def _reach(case: Case) -> float:
-    """Half width of the histograms: 4 standard deviations of the worst result that converged."""
+    """Half width of the histograms: 2.5 standard deviations of the worst result that converged."""
     sigma = [
         case.residual(name, state)[2]["std"]
         for name in (case.finest, *case.micro)
         for state in case.states
         if not case.status(name, state)
     ]
-    return 4 * float(max(sigma)) if sigma else 100.0
+    return 2.5 * float(max(sigma)) if sigma else 100.0
 
 
 def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
@@ -87,12 +107,13 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
     r, weight, stats = case.residual(name, state)
     counts, edges = np.histogram(r, bins=120, range=(-reach, reach), weights=weight)
     density = counts / (weight.sum() * np.diff(edges))
-    label = f"{case.labels[state]}, σ = {stats['std']:.2f}\n{case.verdict(name, state)}"
+    wrong = case.status(name, state)
+    label = f"{case.labels[state]}, σ = {stats['std']:.2f}" + (f", {wrong}" if wrong else "")
     ax.plot(
         (edges[1:] + edges[:-1]) / 2,
         density,
         color=style.SERIES[(state - 1) % 6],
-        ls="--" if case.status(name, state) else "-",
+        ls="--" if wrong else "-",
         lw=1.3,
         label=label,
     )
@@ -117,9 +138,7 @@ def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float])
         ax.set_axis_off()
     for ax in axes[::columns]:
         ax.set_ylabel("rms(du) (voxels)")
-    titles = {n: case.title(n, case.micro[0]) for n in case.states}
-    handles = [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
-    handles.append(style.line("#777777", "criterion", ls=":"))
+    handles = [*_state_handles(case), style.line("#777777", "criterion", ls=":")]
     handles.append(style.line(style.RED, "not converged", ls="", marker="x"))
     fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
@@ -135,6 +154,28 @@ def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
         ax.plot(steps[-1:], solution.history[-1:], "x", color=style.RED, ms=7, mew=2, zorder=4)
 
 
+def cutoff(case: Case, outputs: Iterable[str]) -> None:
+    """Unbiased risk of each l_E that the default micro method tried, above the least of its state."""
+    fig = style.figure(75, 110)
+    ax = fig.subplots()
+    for state in case.states:
+        colour = style.SERIES[(state - 1) % 6]
+        trials = case.notes(case.micro[0], state)["risk"]
+        if not trials:
+            continue
+        tried, risk = np.array(sorted((row["l_e"], row["risk"]) for row in trials)).T
+        risk = (risk - risk.min()) / risk.min()
+        ax.plot(tried, 100 * risk, "o-", color=colour, ms=4, label=case.title(state, case.micro[0]))
+        ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
+    ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um())})")
+    ax.set_ylabel("risk above its least (%)")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter("{x:g}")
+    fig.legend(loc="outside lower center", ncols=2)
+    style.save(fig, outputs)
+
+
 def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:
     """Error against the truth at the micro nodes: rms with p95, and its parts at each strut.
 
@@ -146,9 +187,6 @@ def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:
             found = case.json(f"analysis/error_{name}_state{state}.json")
             x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
             _error(axes, x, found, look[name], not case.status(name, state))
-    low, high = axes[0].get_ylim()
-    if high < 20 * low:
-        axes[0].yaxis.set_minor_formatter("{x:.2g}")
     handles = [
         style.line(style.SERIES[look[name] % 6], name, ls="", marker=style.MARKERS[look[name] % 6])
         for name in names
@@ -174,7 +212,9 @@ def _error_panels(case: Case, names: Sequence[str]) -> tuple:
         ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
         titles = [style.narrow(case.title(n, case.micro[0])) for n in case.states]
         ax.set_xticklabels(titles, fontsize=7)
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter(NullFormatter())
         ax.grid(axis="y", which="both", lw=0.3, color="#dddddd")
     axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")
     return fig, axes

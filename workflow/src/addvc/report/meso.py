@@ -18,7 +18,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
     columns, rows = len(case.states), len(case.meso)
     meshes = [case.mesh(name) for name in case.meso]
     fit, view = _reach(meshes[-1]), oblique(case.specimen.axis)
-    fig, axes = style.panels(rows, columns, aspect(view, fit))
+    fig, axes = style.panels(rows, columns, aspect(view, fit), spare=15, below=9)
     for row, (name, mesh) in enumerate(zip(case.meso, meshes, strict=True)):
         faces, _ = boundary(mesh)
         for column, state in enumerate(case.states):
@@ -27,15 +27,17 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             layer = Layer(mesh.points + solution.u, faces, colour, edges=True, line_width=1.5)
             render([layer], view, 170 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
-            style.note(ax, f"σ(r) = {solution.residual['std']:.2f}{_inverted(mesh, solution.u)}")
+            sigma = f"σ(r) = {solution.residual['std']:.2f} grey levels"
+            style.note(ax, sigma + _inverted(mesh, solution.u), fontsize=8)
         style.row_name(axes[row, 0], name)
+    style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.2)
     style.save(fig, outputs)
 
 
 def _inverted(mesh: Mesh, u: np.ndarray) -> str:
     """How many tetrahedra the displacement turns inside out, where it does."""
     count = int((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).sum())
-    return f"\n{count} of {len(mesh.cells)} inverted" if count else ""
+    return f"\n{count} of {len(mesh.cells):,} inverted" if count else ""
 
 
 def _reach(mesh: Mesh) -> np.ndarray:
@@ -53,7 +55,7 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
     halves = {n: _half(mesh, u[n], axis) for n in case.states}
     usable = [n for n in case.states if not case.status(name, n)] or case.states
     columns = len(u)
-    fig, axes = style.panels(3, columns, aspect(view, fit), bar=16)
+    fig, axes = style.panels(3, columns, aspect(view, fit), bar=16, below=8)
     for d in range(3):
         norm, cmap = style.component_range([u[n][:, d] for n in usable], root=True)
         for column, state in enumerate(case.states):
@@ -66,6 +68,7 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
             style.note(ax, text, fontsize=8)
         label = f"$u_{style.AXES[d]}$ ({style.voxels(case.voxel_um())})"
         style.colour_bar(fig, axes[d], norm, cmap, label, shrink=0.85, aspect=18, pad=0.01)
+    style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.17)
     style.save(fig, outputs)
 
 

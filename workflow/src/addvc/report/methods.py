@@ -1,6 +1,6 @@
 """Methods to paste into a paper, with references, from the configuration and the numbers."""
 
-from addvc.config import loading_axis, micro_names
+from addvc.config import chooses, loading_axis, micro_names
 from addvc.correlation.micro import micro_options
 from addvc.report import style
 
@@ -28,8 +28,12 @@ REFERENCES = {
     "robust": "Geman S, McClure DE. Bayesian image analysis: an application to single photon emission "
     "tomography. Proceedings of the Statistical Computing Section, American Statistical Association, "
     "12-18 (1985)",
+    "stein": "Stein CM. Estimation of the mean of a multivariate normal distribution. The Annals of "
+    "Statistics 9(6), 1135-1151 (1981)",
     "limits": "Leclerc H, Périé JN, Hild F, Roux S. Digital volume correlation: what are the limits to "
     "the spatial resolution? Mechanics & Industry 13(6), 361-371 (2012)",
+    "validation": "Golub GH, Heath M, Wahba G. Generalized cross-validation as a method for choosing a "
+    "good ridge parameter. Technometrics 21(2), 215-223 (1979)",
     "bending": "Deshpande VS, Ashby MF, Fleck NA. Foam topology: bending versus stretching dominated "
     "architectures. Acta Materialia 49(6), 1035-1040 (2001)",
     "gradient": "Zimmerman JA, Bammann DJ, Gao H. Deformation gradients for continuum mechanical "
@@ -65,7 +69,7 @@ def methods(summary: dict, config: dict, scans: dict) -> list[str]:
     """Paragraphs, then the references, as lines of reStructuredText."""
     cite = Citations()
     parts = [images(summary, config, scans), meso(summary, config), micro(summary, config)]
-    parts += [quality(summary), struts(summary)]
+    parts += [quality(summary), struts(summary, config)]
     lines = []
     for part in filter(None, parts):
         lines += [part.format_map(cite), ""]
@@ -138,7 +142,8 @@ def micro(summary: dict, config: dict) -> str:
     wave = f"in weights set on a shear wave of period {options.period:g} voxels along {along}"
     for name, method in micro_names(config).items():
         lead = " The displacement of its nodes minimises" if name == "micro" else " For comparison:"
-        text += f"{lead} {functional(method, section, options)}, {wave} ({method})."
+        used = [state[name]["l_e"] for state in summary["states"] if method != "eq10"]
+        text += f"{lead} {functional(method, section, options, used)}, {wave} ({method})."
     first = section["methods"][0]
     if section["mending"] and section["stages"] > 1 and first != "eq10":
         text += (
@@ -151,8 +156,8 @@ def micro(summary: dict, config: dict) -> str:
     )
 
 
-def functional(method: str, section: dict, options) -> str:
-    """What a method of micro DVC minimises."""
+def functional(method: str, section: dict, options, cutoffs: list[float]) -> str:
+    """What a method of micro DVC minimises; `cutoffs`: l_E of every state (voxels)."""
     if method == "eq10":
         return (
             "the squared residual in the struts, regularised by the equilibrium gap {gap} below "
@@ -165,9 +170,17 @@ def functional(method: str, section: dict, options) -> str:
     return (
         f"the {'robust residual (Geman-McClure weights {robust})' if robust else 'squared residual'} "
         f"in the struts{f' and in the void within {shell:g} voxel of them' if shell else ''}, "
-        f"regularised below {options.l_e:.3g} voxels by an elastic energy (Poisson's ratio "
-        f"{options.nu:g}){' in a frame that turns with the struts' if turns else ''}"
+        f"regularised by an elastic energy (Poisson's ratio {options.nu:g})"
+        f"{' in a frame that turns with the struts' if turns else ''} below "
+        f"{span(cutoffs or [options.l_e], '.3g')} voxels{chosen_words(method, section)}"
     )
+
+
+def chosen_words(method: str, section: dict) -> str:
+    """Where the cut-off length came from."""
+    if chooses(section, method):
+        return ", the length of least unbiased risk {stein} in each state"
+    return ""
 
 
 def endings(summary: dict, method: str) -> str:
@@ -179,15 +192,25 @@ def endings(summary: dict, method: str) -> str:
 
 
 def noise_words(summary: dict) -> str:
-    """The standard uncertainty by noise in voxels and micrometres, where it was made."""
-    found = summary.get("uncertainty")
+    """The standard uncertainty by noise in voxels and micrometres."""
+    found = [state["uncertainty"]["rms"] for state in summary["states"]]
     if not found:
         return ""
-    size = found["rms"] * summary["voxel_size_um"]
+    micrometres = [rms * summary["voxel_size_um"] for rms in found]
     return (
-        f"By the noise of the images the standard uncertainty of the displacement of a node is "
-        f"{found['rms']:.3f} voxel ({size:.2g} micrometres, rms length of the vector). "
+        "By the noise of the images the standard uncertainty of the displacement of a node is "
+        f"{span(found, '.3f')} voxel ({span(micrometres, '.2g')} micrometres, rms length of the "
+        "vector). "
     )
+
+
+def alone_words(summary: dict) -> str:
+    """What noise alone would leave of the residual, where it is known."""
+    found = [state.get("noise_std") for state in summary["states"]]
+    known = [value for value in found if value is not None]
+    if not known:
+        return ""
+    return f", where the noise of both images alone would leave {span(known, '.2f')}"
 
 
 def quality(summary: dict) -> str:
@@ -199,22 +222,29 @@ def quality(summary: dict) -> str:
     ultimate = summary["meshes"]["micro"]["ultimate_error"]
     valid = span([100 * one["valid_nodes"] for one in found], ".1f")
     text = (
-        f"The residual has a standard deviation of {span(residuals, '.2f')} grey levels. "
-        f"{noise_words(summary)}Interpolation alone, under a rigid sub-voxel shift without noise "
-        f"{{limits}}, gives {ultimate:.1e} voxel. {valid} % of the nodes have a residual that the noise "
-        "of the images explains; the others are flagged."
+        f"The residual in the struts has a standard deviation of {span(residuals, '.2f')} grey levels"
+        f"{alone_words(summary)}. {noise_words(summary)}Interpolation alone, under a rigid sub-voxel "
+        f"shift without noise {{limits}}, gives {ultimate:.1e} voxel. {valid} % of the nodes have a "
+        "residual that the noise of the images explains; the others are flagged."
     )
     errors = [one["error"]["median"] for one in found if one["error"]]
     known = f" Against the known truth the median error is {span(errors or [0], '.3f')} voxel."
     return text + (known if errors else "")
 
 
-def struts(summary: dict) -> str:
+def struts(summary: dict, config: dict) -> str:
     """How struts and cells were analysed, and what came out."""
     found = [s["struts"] for s in summary["states"] if (s["struts"] or {}).get("bending_share")]
     if not found:
         return ""
     text = (
+        "Noise that no frame of elastic struts in equilibrium could follow was taken off the "
+        "displacement, with the weight of the equilibrium by generalised cross-validation "
+        "{validation}, unless that would add to the error by Stein's estimate {stein}. "
+        if config["struts"]["equilibrium"]
+        else ""
+    )
+    text += (
         "The motion of each strut was fitted by that of a geometrically exact beam; the energy of the "
         f"{span([one['valid'] for one in found], 'd')} valid struts is in bending {{bending}} by "
         f"{span([100 * one['bending_share'] for one in found], '.0f')} %."

@@ -6,6 +6,11 @@ def figure(value: float | None, form: str) -> str:
     return "unknown" if value is None else format(value, form)
 
 
+def micro_name(summary: dict) -> str:
+    """The default micro method: the first of them."""
+    return next(mesh for mesh in summary["meshes"] if mesh.startswith("micro"))
+
+
 def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
     """A table in reStructuredText; "None." in place of one without rows."""
     if not rows:
@@ -16,27 +21,38 @@ def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
     return [*lines, ""]
 
 
+RESIDUAL_WORDS = (
+    "sigma(r): standard deviation of the residual at the Gauss points of the micro mesh (inside the "
+    "struts, weighted by volume), for every mesh. Noise alone: what the noise of both images would "
+    "leave there under the true displacement, as their voids differ. Far above it something is not "
+    "followed; somewhat below it is normal for micro DVC, whose many unknowns follow part of the noise."
+)
+
+
 def results_table(summary: dict) -> list[str]:
-    """sigma(r) on the micro quadrature and, with a truth, the error at bulk nodes."""
+    """sigma(r) on the micro quadrature beside that of noise alone and, with a truth, the error at bulk
+    nodes."""
     known = any(state[mesh]["error"] for state in summary["states"] for mesh in summary["meshes"])
-    header = ["state", "mesh", "sigma(r), grey levels"]
+    header = ["state", "mesh", "sigma(r), grey levels", "noise alone, grey levels"]
     header += ["error median, voxel", "error p95, voxel", "error rms, voxel"] if known else []
     rows = []
     for state in summary["states"]:
         for mesh in summary["meshes"]:
             error = state[mesh]["error"] or {}
-            row = [state["label"], mesh, figure(state[mesh]["residual_std"], ".3f")]
+            sigma = state[mesh]["residual_std"], state.get("noise_std")
+            row = [state["label"], mesh, *(figure(value, ".3f") for value in sigma)]
             rows.append(row + [f"{error[key]:.3f}" for key in ("median", "p95", "rms") if error])
     return list_table(header, rows)
 
 
 def convergence_table(summary: dict) -> list[str]:
-    """Start, iterations and last step of every state and mesh."""
+    """Start, l_E, iterations and last step of every state and mesh."""
     rows = [
         [
             state["label"],
             state["micro_start"] if mesh.startswith("micro") else state[mesh]["start"],
             mesh,
+            "–" if state[mesh]["l_e"] is None else f"{state[mesh]['l_e']:.3g}",
             str(state[mesh]["iterations"]),
             figure(state[mesh]["last_step"], ".1e"),
             "yes" if state[mesh]["converged"] else "NO",
@@ -45,7 +61,8 @@ def convergence_table(summary: dict) -> list[str]:
         for mesh in summary["meshes"]
     ]
     return list_table(
-        ["state", "start", "mesh", "iterations", "last rms(du), voxel", "converged"], rows
+        ["state", "start", "mesh", "l_E, voxel", "iterations", "last rms(du), voxel", "converged"],
+        rows,
     )
 
 

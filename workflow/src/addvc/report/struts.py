@@ -18,6 +18,7 @@ from addvc.report.scene import Layer, aspect, oblique, render
 
 BINS = np.linspace(0, 1, 21)
 COMPARED = ("bending_share", "axial_strain")
+PALE_GREY, GREY = "#e3e3e3", "#9a9a9a"
 PALE = (1.0, 0.45, 0.15)
 """How full the colours of bending, stretching and torsion are."""
 
@@ -46,14 +47,20 @@ def network(case: Case, outputs: Iterable[str]) -> None:
             known = np.isfinite(values) & (owner != FREE_END)
             layers = [
                 Layer(points, faces[known], values=values[known], norm=norm, cmap=cmap),
-                Layer(points, faces[~known & (owner != FREE_END)], colour="#e3e3e3", opacity=0.6),
-                Layer(points, faces[owner == FREE_END], colour="#9a9a9a"),
+                Layer(points, faces[~known & (owner != FREE_END)], colour=PALE_GREY, opacity=0.6),
+                Layer(points, faces[owner == FREE_END], colour=GREY),
             ]
             render(layers, view, style.WIDTH / 2, points, shadows=True).show(ax[panel])
             style.headline(ax[panel], f"{name}, {case.title(state, name)}", 2 * row + panel)
         label = "share of bending (–)" if row == 0 else "axial strain (–)"
-        style.colour_bar(fig, ax, norm, cmap, label, shrink=0.7)
+        ends = "neither" if row == 0 else "both"
+        style.colour_bar(fig, ax, norm, cmap, label, shrink=0.7, extend=ends)
     style.scale_bar(axes[1, 0], case.voxel_um(), 0.4)
+    handles = [
+        Patch(color=PALE_GREY, label="not to be trusted"),
+        Patch(color=GREY, label="junction"),
+    ]
+    fig.legend(handles=handles, loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 
 

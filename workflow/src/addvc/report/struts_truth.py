@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from matplotlib.axes import Axes
 
+from addvc.analysis.strut_table import RAW
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.struts import COMPARED, columns, results, trusted
@@ -78,6 +79,7 @@ def truth_rows(case: Case) -> list[list[str]]:
         ]
     ]
     names = {"field": "true displacement", "beams": "beams of the twin"}
+    names |= {case.micro[0] + RAW: f"{case.micro[0]}, as measured"}
     flags = {n: read[n].pop("flags") for n in case.states}
     for key, quantity in FLAGS.items():
         values = [_number(flags[n][key]) for n in case.states]

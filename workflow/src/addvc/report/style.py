@@ -66,6 +66,17 @@ def panels(rows: int, columns: int, aspect: float, spare: float = 12.0, bar: flo
     return fig, fig.subplots(rows, columns, squeeze=False)
 
 
+def rows_of_pictures(
+    aspects: list[float], columns: int, spare: float = 12.0
+) -> tuple[Figure, np.ndarray]:
+    """The same for rows whose pictures are as wide, but of different aspects."""
+    width = (WIDTH - 4) / columns - 3
+    width = min(width, (HEIGHT - len(aspects) * spare) / sum(aspects))
+    heights = [aspect * width + spare for aspect in aspects]
+    fig = figure(sum(heights), columns * (width + 3) + 4)
+    return fig, fig.subplots(len(aspects), columns, squeeze=False, height_ratios=heights)
+
+
 def signed(value: float, digits: int = 2) -> str:
     """A number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
@@ -144,9 +155,10 @@ def _square(x: np.ndarray) -> np.ndarray:
 def colour_bar(
     fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options
 ) -> None:
-    """A colour bar with pointed ends, since ranges are robust; its width is left to the layout."""
+    """A colour bar, its ends pointed unless `extend` says otherwise, since ranges are robust; its width
+    is left to the layout."""
     mappable = ScalarMappable(norm, cmap)
-    bar = fig.colorbar(mappable, ax=axes, extend="both", extendfrac=0.03, **options)
+    bar = fig.colorbar(mappable, ax=axes, extendfrac=0.03, **({"extend": "both"} | options))
     bar.set_label(label)
     bar.ax.tick_params(length=2.5, width=0.6)
     bar.outline.set_linewidth(0.5)
@@ -174,15 +186,16 @@ def row_name(ax: Axes, name: str) -> None:
     note(ax, name, -0.03, 0.5, rotation=90, ha="right", va="center", fontsize=9)
 
 
-def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3) -> None:
-    """A bar below the picture, about `share` of its width, with its length in both units."""
+def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3, y: float = -0.025) -> None:
+    """A bar below the picture, about `share` of its width, with its length in both units; `y`: where,
+    over the height of the picture."""
     left, right = sorted(ax.get_xlim())
     length = nice_length(share * (right - left))
     micro = length * voxel_um
     size = f"{micro / 1000:.3g} mm" if micro >= 1000 else f"{micro:.3g} µm"
     end, where = length / (right - left), {"transform": ax.transAxes, "clip_on": False}
-    ax.plot([0, end], [-0.025, -0.025], "k", lw=2, solid_capstyle="butt", **where)
-    note(ax, f"{length:g} voxels = {size}", 0, -0.04, ha="left", fontsize=8)
+    ax.plot([0, end], [y, y], "k", lw=2, solid_capstyle="butt", **where)
+    note(ax, f"{length:g} voxels = {size}", 0, y - 0.015, ha="left", fontsize=8)
 
 
 def save(fig: Figure, outputs: Iterable[str | Path]) -> None:

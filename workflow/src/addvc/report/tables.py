@@ -10,6 +10,7 @@ from addvc.correlation.meso import meso_options
 from addvc.correlation.micro import micro_options
 from addvc.images.files import atomic_path
 from addvc.report.case import Case
+from addvc.report.methods import span
 
 Rows = list[list[str]]
 TWIN = {
@@ -114,7 +115,7 @@ def _column(case: Case, name: str, config: dict, methods: dict[str, str]) -> dic
     """Parameters of one mesh by name, each with its unit."""
     facts, micro = case.mesh_facts(name), name in case.micro
     image = case.json("input.json")["scans"][0]["binned_shape"]
-    given = _micro(case, config, methods[name]) if micro else _meso(case, name, config)
+    given = _micro(case, config, name, methods[name]) if micro else _meso(case, name, config)
     shared = {
         "Ultimate error (voxels)": _ultimate(case, name, "ultimate_error"),
         "The same with noise (voxels)": _ultimate(case, name, "with_noise"),
@@ -143,13 +144,14 @@ def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
     }
 
 
-def _micro(case: Case, config: dict, method: str) -> dict[str, str]:
+def _micro(case: Case, config: dict, name: str, method: str) -> dict[str, str]:
     """Functional, lengths and start of a micro method."""
     options = micro_options(config["micro"], case.cell_size, case.specimen.axis)
     if method == "eq10":
         functional, lengths = "Eq. 10", f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}"
     else:
-        functional, lengths = method.replace("_", " "), f"l_E = {options.l_e:.3g}"
+        chosen = [case.cutoff(name, state) for state in case.states] or [options.l_e]
+        functional, lengths = method.replace("_", " "), f"l_E = {span(chosen, '.3g')}"
     return {
         "Matching functional": functional,
         "Regularisation length (voxels)": lengths,

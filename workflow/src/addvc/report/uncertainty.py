@@ -17,12 +17,14 @@ NORMAL, ALONG = style.BLUE, style.ORANGE
 
 def uncertainty(case: Case, outputs: Iterable[str], truth: bool) -> None:
     """(a) Standard uncertainty of each node on the micro mesh, (b) of each strut, normal to it and
-    along it, against its radius, (c) with a truth, the errors of nodes against their uncertainty."""
-    nodes, struts = load_uncertainty(case.path("analysis/uncertainty.h5"))
-    found, unit = case.json("analysis/uncertainty.json"), style.voxels(case.voxel_um())
+    along it, against its radius, in the state that is shown; (c) with a truth, the errors of nodes
+    against their uncertainty, in every state."""
+    state = case.shown_state()
+    nodes, struts = load_uncertainty(case.path(f"analysis/uncertainty_state{state}.h5"))
+    found = case.json(f"analysis/uncertainty_state{state}.json")
     fig = style.figure(128 if truth else 96)
     left, right = fig.subfigures(1, 2, width_ratios=(1.15, 1))
-    _map(left, case, nodes, unit)
+    _map(left, case, nodes, f"{case.micro[0]}, {case.labels[state]}")
     panels = right.subplots(2 if truth else 1, 1, squeeze=False)[:, 0]
     _by_radius(panels[0], load_partition(case.path("geometry/struts.h5"))[0], struts)
     style.headline(panels[0], "of the struts", 1)
@@ -36,16 +38,17 @@ def uncertainty(case: Case, outputs: Iterable[str], truth: bool) -> None:
     style.save(fig, outputs)
 
 
-def _map(fig, case: Case, nodes: np.ndarray, unit: str) -> None:
-    """The nodes on the surface of the micro mesh."""
+def _map(fig, case: Case, nodes: np.ndarray, title: str) -> None:
+    """The nodes on the surface of the micro mesh at rest."""
     mesh, view = case.mesh("micro"), oblique(case.specimen.axis)
     norm = style.robust_range([nodes])
     layer = Layer(mesh.points, boundary(mesh)[0], values=nodes, norm=norm, cmap=style.MAGNITUDE)
     ax = fig.subplots()
     render([layer], view, 85).show(ax)
-    style.headline(ax, f"standard uncertainty, {case.micro[0]}", 0)
+    style.headline(ax, f"standard uncertainty, {title}", 0)
     style.scale_bar(ax, case.voxel_um(), 0.4)
-    label, place = f"from noise ({unit})", {"location": "top", "shrink": 0.8, "aspect": 30}
+    label = f"from noise ({style.voxels(case.voxel_um())})"
+    place = {"location": "top", "shrink": 0.8, "aspect": 30}
     style.colour_bar(fig, ax, norm, style.MAGNITUDE, label, **place)
 
 

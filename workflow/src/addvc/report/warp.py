@@ -3,13 +3,15 @@
 from collections.abc import Iterable
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
 from addvc.fem.mesh import Mesh
 from addvc.geometry.region import Region, caps_depth
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.scene import Layer, View, aspect, facing, render
+from addvc.report.scene import Layer, Picture, View, aspect, facing, render
 from addvc.report.surfaces import boundary, clipped, segmented, slab, slab_box
 
 MESO, MICRO = "#e0903c", "#3d86cf"
@@ -29,22 +31,41 @@ def warped(case: Case, outputs: Iterable[str]) -> None:
         title = f"$I_r$ carried by {name}: {case.verdict(name, state)}"
         bodies[title] = _cut(mesh, u[name], *after)
     found = case.json(f"analysis/warp_state{state}.json")
-    words = [_words(found[name]) for name in u]
+    words = [f"line: outline of (b)\n{_words(found[name])}" for name in u]
     _draw_warped(bodies, words, facing(axis, slab(mesh, axis, 1)[0]), case.voxel_um(), outputs)
 
 
 def _draw_warped(bodies: dict, words: list, view: View, voxel_um: float, outputs) -> None:
-    """The four surfaces of Fig. 16 at one scale, `words` below the carried ones."""
-    fit = np.vstack([points for points, _ in bodies.values() if len(points)])
-    fig, axes = style.panels(2, 2, aspect(view, fit), spare=20)
+    """The four surfaces of Fig. 16 at one scale, the outline of (b) over the carried ones, and `words`
+    below these."""
+    titles, surfaces = list(bodies), list(bodies.values())
+    fits = [_row_fit(surfaces, surfaces[:2], view), _row_fit(surfaces, surfaces[2:], view)]
+    fig, axes = style.rows_of_pictures([aspect(view, fit) for fit in fits], 2, spare=20)
     colours = style.SOLID, style.SOLID, MESO, MICRO
-    for panel, (ax, (title, body)) in enumerate(zip(axes.flat, bodies.items(), strict=True)):
+    for panel, (ax, title, body) in enumerate(zip(axes.flat, titles, surfaces, strict=True)):
+        fit = fits[panel // 2]
         render([Layer(*body, colours[panel])], view, 82, fit, shadows=True).show(ax)
         style.headline(ax, title, panel)
         if panel > 1:
+            _outline(ax, render([Layer(*surfaces[1], "#000000")], view, 82, fit))
             style.note(ax, words[panel - 2], y=-0.02)
     style.scale_bar(axes[0, 0], voxel_um, 0.2)
     style.save(fig, outputs)
+
+
+def _row_fit(everything: list, row: list, view: View) -> np.ndarray:
+    """Two corners (2, 3) of a picture: as wide as all surfaces, as high as those of its row."""
+    across = np.concatenate([points @ view.right for points, _ in everything])
+    along = np.concatenate([points @ view.up for points, _ in row])
+    ends = [(across.min(), along.min()), (across.max(), along.max())]
+    return np.array([x * view.right + y * view.up for x, y in ends])
+
+
+def _outline(ax: Axes, picture: Picture) -> None:
+    """The edge of what a picture shows on white, as a line."""
+    solid = (picture.image.min(axis=2) < 128).astype(float)
+    options = {"extent": picture.extent, "origin": "upper"}
+    ax.contour(solid, [0.5], colors=style.DARK, linewidths=0.5, **options)
 
 
 def _words(found: dict) -> str:
@@ -83,7 +104,7 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
     places = _places(case, mesh, np.linalg.norm(micro - meso, axis=1), half)
     deformed, gamma = case.image(state)[0], case.gamma
     titles = [r"$\Omega_r$", *(_zoom_title(case, n, state) for n in (case.finest, case.micro[0]))]
-    fig, axes = style.panels(len(places), 3, 1.0)
+    fig, axes = style.panels(len(places), 3, 1.0, below=6)
     for row, node in enumerate(places):
         view = _across(micro[node] - meso[node], case.specimen.axis)
         here, there = mesh.points[node], mesh.points[node] + micro[node]
@@ -97,6 +118,9 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
             render(layers, view, 55, fit).show(axes[row, column])
             style.headline(axes[row, column], titles[column], 3 * row + column)
         style.scale_bar(axes[row, 0], case.voxel_um())
+    colours = {r"$\Omega_d$: segmented $I_d$": style.SOLID, r"$\Omega_r + u$: carried": style.RED}
+    handles = [Patch(color=colour, label=label) for label, colour in colours.items()]
+    fig.legend(handles=handles, loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 
 

@@ -3,13 +3,16 @@
 import yaml
 
 from addvc.errors import AddvcError
+from addvc.report.doubts import failed_checks, warnings
 from addvc.report.methods import methods
 from addvc.report.page_tables import (
+    RESIDUAL_WORDS,
     convergence_table,
     cost_table,
     figure,
     hashes_list,
     meshes_table,
+    micro_name,
     results_table,
     scans_table,
 )
@@ -29,7 +32,8 @@ def closing_lines(summary: dict, folder: str) -> str:
         found = state[micro]
         lines.append(
             f"  state {state['state']} ({state['strain']:.1%} measured): "
-            f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}, "
+            f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}"
+            f"{alone_words(state)}, "
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
             + flag_words(state.get("struts"))
             + error_words(found["error"])
@@ -49,16 +53,17 @@ def flag_words(struts: dict | None) -> str:
     return f", {struts['flagged']} of {struts['valid'] + struts['flagged']} struts flagged"
 
 
+def alone_words(state: dict) -> str:
+    """What noise alone would leave of the residual, where the images show it."""
+    alone = state.get("noise_std")
+    return "" if alone is None else f" (noise alone {alone:.2f})"
+
+
 def error_words(error: dict | None) -> str:
     """Median and 95th percentile of the error, where a truth is known."""
     if not error:
         return ""
     return f", error median {error['median']:.3f}, p95 {error['p95']:.3f} voxel"
-
-
-def micro_name(summary: dict) -> str:
-    """The default micro method: the first of them."""
-    return next(mesh for mesh in summary["meshes"] if mesh.startswith("micro"))
 
 
 def heading(text: str, line: str = "-") -> list[str]:
@@ -71,7 +76,7 @@ def front_page(summary: dict, config: dict, scans: dict) -> str:
     lines = heading(f"addvc: case {summary['case']}", "=")
     lines += answer(summary) + look_around(summary)
     lines += heading("Warnings and failures") + warnings(summary)
-    lines += heading("Residual and error of each mesh") + results_table(summary)
+    lines += [*heading("Residual and error of each mesh"), RESIDUAL_WORDS, *results_table(summary)]
     lines += heading("Convergence") + convergence_table(summary)
     lines += heading("Meshes") + meshes_table(summary)
     lines += heading("Cost") + cost_table(summary["cost"])
@@ -156,102 +161,6 @@ def band_words(cells: dict | None) -> str:
     return (
         f" {cells['band_strain_share']:.0%} of the compression is in a band with "
         f"{cells['band_volume_share']:.0%} of the volume, {shape}."
-    )
-
-
-def warnings(summary: dict) -> list[str]:
-    """What to distrust; "None." when there is nothing, so that the section is never silently empty."""
-    found = [line for state in summary["states"] for line in state_warnings(state, summary)]
-    micro = summary["meshes"][micro_name(summary)]
-    kept = micro["kept_fraction"] * micro["voxel_kept_fraction"]
-    if kept < 0.9:
-        found.append(
-            f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
-            "and was left out; lower mesh.size, the porosity or images.blur."
-        )
-    found += topology_warnings(summary.get("topology"))
-    if not any(state[micro_name(summary)]["error"] for state in summary["states"]):
-        found.append(
-            "- The error on these images is not known: the residual and the ultimate error "
-            "bound it from below only. `virtual` in the configuration measures it for a "
-            "smooth field on your own reference."
-        )
-    found += [
-        f"- The synthetic test is not what it claims to be: {check_words(check)}."
-        for check in failed_checks(summary)
-    ]
-    return found or ["None."]
-
-
-def topology_warnings(counts: dict | None) -> list[str]:
-    """One line when the mesh of the struts has stubs, necks or welds."""
-    names = {
-        "stubs": "dangling stubs",
-        "necks": "necks thinner than a square voxel",
-        "welds": "welds torn by the displacement",
-    }
-    some = [f"{counts[key]} {name}" for key, name in names.items() if counts and counts[key]]
-    if not some:
-        return []
-    return [
-        f"- The mesh of the struts has {', '.join(some)} (0 of each in a foam): see the figure of "
-        "its topology, and geometry/topology.json for where. Elastic energy (`corotational`) holds "
-        "them, so its results can be used; trust `eq10` least there. For fewer of them, first lower "
-        "images.blur, then mesh.size; a porosity that is too high breaks struts too."
-    ]
-
-
-def state_warnings(state: dict, summary: dict) -> list[str]:
-    """What to distrust of one state: loops that did not end, nodes in doubt, a failure."""
-    found = []
-    for mesh in summary["meshes"]:
-        one = state[mesh]
-        if not one["converged"]:
-            found.append(
-                f"- State {state['state']}, {mesh}: the loop did not end in "
-                f"{one['iterations']} iterations (last rms(du) {figure(one['last_step'], '.1e')} "
-                "voxel). Look at the residual maps (Fig. 13); a longer "
-                "regularisation length or a better start may help."
-            )
-    doubtful = 1 - state[micro_name(summary)]["valid_nodes"]
-    if state["verdict"] == "flagged" and doubtful > 0.05:
-        found.append(
-            f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
-            "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
-            "look at the residual maps (Fig. 13)."
-        )
-    struts = state.get("struts") or {"valid": 0, "flagged": 0}
-    count = struts["valid"] + struts["flagged"]
-    if struts["flagged"] > 0.1 * count:
-        found.append(
-            f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
-            "flagged: broken by the threshold, not measured, or on nodes in doubt. What is said of "
-            "bending leaves them out; the scene shows where they are."
-        )
-    if state["verdict"] == "failed":
-        found.append(
-            f"- State {state['state']} could not be registered: at least half of its nodes "
-            "have a residual far above the noise of the images."
-        )
-    return found
-
-
-def failed_checks(summary: dict) -> list[dict]:
-    """Checks of the twin that do not hold; none for other images."""
-    return (summary.get("twin_checks") or {"failed": []})["failed"]
-
-
-def check_words(check: dict) -> str:
-    """A check that does not hold: its value, its limit, its remedy."""
-    unit = "" if check["unit"] == "–" else f" {check['unit']}"
-    limits = [
-        f"{word} {check[key]:.4g}"
-        for word, key in (("at least", "low"), ("at most", "high"))
-        if check[key] is not None
-    ]
-    return (
-        f"{check['name']} is {figure(check['value'], '.4g')}{unit} ({', '.join(limits)}); "
-        f"{check['remedy']}"
     )
 
 

@@ -1,0 +1,115 @@
+"""`./addvc run` tells of each job in a line, hides no error and keeps the status."""
+
+import logging
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from addvc.runtime import job
+from snakemake_logger_plugin_addvc import clock, job_words
+
+SOURCE = Path(__file__).parents[2] / "workflow/src"
+SNAKEFILE = """
+rule all:
+    input: "meso12_state1.txt", "meso12_state2.txt", "bad.txt"
+rule meso_dvc:
+    output: "{mesh}_state{state}.txt"
+    shell: "touch {output}"
+rule bad:
+    output: "bad.txt"
+    log: "bad.log"
+    shell: "echo the value, the limit and the remedy > {log}; exit 3"
+"""
+
+
+@pytest.fixture
+def snakemake(tmp_path):
+    """snakemake(words): a small workflow run with the lines of addvc in its terminal."""
+    (tmp_path / "Snakefile").write_text(SNAKEFILE)
+
+    def run(*words):
+        command = [sys.executable, "-m", "snakemake", "--logger", "addvc", "--cores", "1", *words]
+        env = os.environ | {"PYTHONPATH": str(SOURCE)}
+        done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+
+    return run
+
+
+def full_log(folder):
+    [path] = folder.glob(".snakemake/log/*.log")
+    return path.read_text()
+
+
+def test_a_line_for_each_job_and_all_of_the_log_in_the_file(snakemake, tmp_path):
+    status, said = snakemake("meso12_state1.txt", "meso12_state2.txt")
+    assert status == 0
+    lines = [line for line in said.splitlines() if "steps" in line]
+    for count, line in enumerate(lines, start=1):
+        share = 100 * count // 2
+        start = rf" +0:\d\d  {count} of 2 steps \({share}%\) done: meso DVC, meso12, state [12]"
+        assert re.fullmatch(start, line)
+    assert len(lines) == 2 and "2 jobs to do" in said
+    assert "Finished jobid" not in said and "reason:" not in said
+    assert full_log(tmp_path).count("Finished jobid") == 2
+    assert full_log(tmp_path).count("rule meso_dvc:") == 2
+
+
+def test_a_failed_job_is_told_in_full_and_the_status_stays(snakemake, tmp_path):
+    status, said = snakemake("--keep-going", "--show-failed-logs")
+    assert status == 1
+    assert "Error in rule bad" in said and "the value, the limit and the remedy" in said
+    assert len(re.findall(r"of 4 steps", said)) == 2, "the others are made"
+    assert "Error in rule bad" in full_log(tmp_path)
+
+
+def test_what_is_wrong_before_any_job_is_told(snakemake, tmp_path):
+    status, said = snakemake("nothing.txt")
+    assert status == 1 and "nothing.txt" in said and "MissingRuleException" in said
+    (tmp_path / "Snakefile").write_text(
+        "from snakemake.exceptions import WorkflowError\nraise WorkflowError('the remedy')\n"
+    )
+    status, said = snakemake()
+    assert status == 1 and "the remedy" in said
+
+
+def test_a_dry_run_is_snakemakes_own(snakemake):
+    status, said = snakemake("-n")
+    assert status == 0
+    assert "rule bad:" in said and "reason: Missing output files" in said and "Job stats:" in said
+
+
+def test_nothing_to_be_done_is_said(snakemake):
+    snakemake("meso12_state1.txt")
+    assert "Nothing to be done" in snakemake("meso12_state1.txt")[1]
+
+
+def test_words_and_clock():
+    assert job_words("micro_dvc", {"micro": "micro-eq10", "state": 3}) == (
+        "micro DVC, micro-eq10, state 3"
+    )
+    assert [clock(s) for s in (0, 65.9, 3725)] == ["0:00", "1:05", "1:02:05"]
+
+
+@pytest.mark.parametrize(("level", "shown"), [("INFO", True), ("WARNING", False), (None, True)])
+def test_what_a_job_says_goes_to_its_log_and_by_choice_to_the_terminal(
+    tmp_path, monkeypatch, capsys, level, shown
+):
+    if level:
+        monkeypatch.setenv("ADDVC_LOG", level)
+    else:
+        monkeypatch.delenv("ADDVC_LOG", raising=False)
+    path = tmp_path / "job.log"
+    one = SimpleNamespace(log=[path], rule="meso_dvc", wildcards={"state": 2}, threads=1)
+    with job(one) as log:
+        log.info("iteration 1")
+        log.warning("a tenth is missing")
+    said = capsys.readouterr().err
+    assert ("iteration 1" in said) == shown and "a tenth is missing" in said
+    assert "[meso_dvc 2] iteration 1" in path.read_text()
+    assert logging.getLogger("addvc").handlers == []

@@ -1,0 +1,85 @@
+"""l_E is the one that the error wants, known from the images alone."""
+
+import numpy as np
+import pytest
+
+from addvc.config import chooses
+from addvc.correlation.corotational import Stage, corotational, stage_system
+from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial
+from addvc.correlation.metric import hessian
+from addvc.correlation.micro import ladder
+from addvc.correlation.register import Stop, register
+from addvc.correlation.uncertainty import Noise
+from addvc.fem.assembly import node_pattern
+from verification.frame import image, rms_error
+
+NOISE = 1.5
+LADDER = Ladder(Noise(NOISE, 0.0), shortest=-4, longest=3)
+PLAN = [Stage(True, None, Stop(1e-3, 20)), Stage(True, None, Stop(1e-3, 20))]
+
+
+def bowed(amplitude, period):
+    """A wave of the frame: u at points, and where a voxel comes from (to second order)."""
+    wave = lambda x: amplitude * np.sin(2 * np.pi * x[:, [1, 2, 0]] / period)  # noqa: E731
+    return wave, lambda x: x - wave(x - wave(x))
+
+
+def found(problem, deformed):
+    """A converged trial of the problem from rest."""
+    rest = np.zeros_like(problem.reference.mesh.points)
+    system = stage_system(problem, PLAN[0], rest)
+    solution = register(system, deformed, rest, PLAN[0].stop)
+    return trial(system, deformed, solution.u, Ladder(LADDER.noise, draws=8))
+
+
+def test_risks_differ_as_the_errors_do(problem):
+    """In the metric of H, for frames that did not move: error and risk fall together with l_E."""
+    h = hessian(problem.reference, node_pattern(problem.reference.mesh))
+    differences = []
+    for seed in (31, 32, 33, 34):
+        error, risks = [], []
+        for times in (1 / RATIO, RATIO):
+            one = found(problem.cut_off(times), image(lambda x: x, seed))
+            error.append(one.u.ravel() @ (h @ one.u.ravel()))
+            risks.append(risk(one, 1.0)["risk"])
+        differences.append((error[0] - error[1], risks[0] - risks[1]))
+    errors, risks = np.array(differences).T
+    assert (errors > 0).all()
+    assert risks.mean() == pytest.approx(errors.mean(), rel=0.3)
+
+
+def test_a_linear_step_tells_what_the_other_cut_off_gives(problem):
+    deformed = image(bowed(0.3, 30)[1], 31)
+    here, there = found(problem, deformed), found(problem.cut_off(RATIO), deformed)
+    assert risk(here, RATIO)["misfit"] == pytest.approx(risk(there, 1.0)["misfit"], rel=0.02)
+    assert risk(here, RATIO)["freedom"] == pytest.approx(risk(there, 1.0)["freedom"], rel=0.05)
+
+
+def test_short_waves_want_a_shorter_cut_off_than_rest(problem):
+    rest, _ = least_risk(found(problem, image(lambda x: x, 31)), LADDER, 0)
+    rough, _ = least_risk(found(problem, image(bowed(1.0, 12)[1], 31)), LADDER, 0)
+    assert rest == LADDER.longest and rough < 0
+
+
+@pytest.mark.parametrize("period", [12, 40])
+def test_the_choice_is_close_to_the_best_of_the_ladder(problem, period):
+    wave, back = bowed(0.6, period)
+    truth, deformed = wave(problem.reference.mesh.points), image(back, 31)
+    start = np.zeros_like(truth)
+    errors = [
+        rms_error(corotational(problem.cut_off(RATIO**k), deformed, start, PLAN)[0].u, truth)
+        for k in range(LADDER.shortest, LADDER.longest + 1)
+    ]
+    solution, notes = corotational(problem, deformed, start, PLAN, ladder=LADDER)
+    assert rms_error(solution.u, truth) < 1.15 * min(errors)
+    assert notes["l_e"] / problem.cutoff == pytest.approx((notes["c"] / problem.weight) ** 0.5)
+
+
+def test_a_given_length_is_not_chosen():
+    section = {"l_e": "auto", "stages": 3}
+    assert ladder(section, {"noise": 2.0}, 0.8, "corotational").noise == Noise(2.0, 0.8)
+    assert ladder(section, {"noise": 2.0}, 0.8, "eq10") is None
+    for change in ({"l_e": 23.0}, {"stages": 1}, {"times": {"l_e": 2}}):
+        assert not chooses(section | change, "corotational")
+    assert not chooses(section, "without_choice")
+    assert chooses(section | {"times": {"l_k": 2}}, "without_shell")

@@ -1,0 +1,19 @@
+"""What the noise of both images alone leaves of the residual, in each state."""
+
+from addvc.analysis.image_noise import pair_noise
+from addvc.images.files import read_json, write_json
+from addvc.images.scans_store import load_volume
+from addvc.images.specimen import Specimen
+from addvc.runtime import job
+
+with job(snakemake) as log:
+    source = snakemake.input
+    specimen = Specimen.from_dict(read_json(source.specimen))
+    gamma = read_json(source.threshold)["threshold"]
+    reference = load_volume(source.reference)[0]
+    noise = {
+        state: pair_noise(reference, load_volume(path)[0], specimen, gamma)
+        for state, path in zip(snakemake.params.states, source.deformed, strict=True)
+    }
+    log.info("residual of noise alone, grey levels: %s", noise)
+    write_json(snakemake.output[0], noise)

@@ -1,0 +1,213 @@
+"""The whole foam as a frame of beams, thin struts included, from the grey level of the reference.
+
+The mesh of micro DVC holds what the threshold for the porosity keeps; it loses thin struts, which
+carry load all the same. A lower threshold keeps the network whole: its skeleton gives the struts,
+the centroids of the grey level their lines, the grey level per length their sections. A junction is
+the point nearest to the lines of its struts, continued straight on.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
+from addvc.analysis.struts import section_areas
+from addvc.fem.frame import Frame
+from addvc.geometry.lines import nearest_line, resampled
+from addvc.geometry.region import Region, caps_depth
+from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph, strut_graph
+from addvc.images.files import atomic_path
+
+LOWER = 0.8
+"""Of the threshold for the porosity, above the void: where no strut is lost yet and none is made up."""
+
+PIECE = 2.6
+"""Target length of a piece, voxels."""
+
+SHORTEST = 0.8
+"""A piece from the end of a line to its junction, at least, voxels."""
+
+TRIMMED = 0.3
+"""Most of a strut that a junction takes at each end, where the balls of both would leave nothing."""
+
+ASTRAY = 1.5
+"""How far from the skeleton's a junction may be put, voxels."""
+
+DOUBT = 0.1
+"""Weight of the skeleton's junction against the line of one strut."""
+
+LEAST_AREA = 0.3
+"""Of a section, voxel^2."""
+
+HALO = 2
+"""Voxels around the solid that hold grey level of it."""
+
+CUT = 1.0
+"""Depth below the surface of the region, voxels, where struts are cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class StrutFrame:
+    """The frame, and which of its nodes (n,) may be loaded from outside; `span`: the median length of
+    its struts, voxels."""
+
+    frame: Frame
+    loaded: np.ndarray
+    span: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Voxels (q, 3) in and near the solid with their share (q,) of solid, and the grey level
+    (nx, ny, nz) above that of the void."""
+
+    voxels: np.ndarray
+    share: np.ndarray
+    excess: np.ndarray
+
+
+def strut_frame(excess: np.ndarray, kept: np.ndarray, limit: float, region: Region) -> StrutFrame:
+    """The frame of the solid of grey level excess (nx, ny, nz) above the void; `limit`: the threshold
+    for the porosity above the void, kept (nx, ny, nz): what it keeps; all within the region."""
+    inside = within(region, excess.shape)
+    mask = largest(inside & (excess > LOWER * limit))
+    graph = strut_graph(mask)
+    if not graph.branches:
+        return StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
+                          np.zeros(0, bool), 0.0)  # fmt: skip
+    near = ndimage.binary_dilation(mask, iterations=HALO) & inside
+    contrast = excess[near].sum() / (kept & inside).sum()
+    solid = Solid(np.argwhere(near).astype(float), excess[near] / contrast, excess * inside)
+    lines = [resampled(branch.points) for branch in graph.branches]
+    owned = nearest_line(lines, solid.voxels)
+    curves = [
+        strut_curve(branch, line, solid.share[own].sum(), graph.radii, solid.excess)
+        for branch, line, own in zip(graph.branches, lines, owned, strict=True)
+    ]
+    frame, span = assembled(graph, curves, owned, solid)
+    return StrutFrame(frame, loaded(frame.points, mask, region), span)
+
+
+def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
+    """(nx, ny, nz) bool: voxels of an image that are in the region."""
+    grid = np.moveaxis(np.indices(shape, dtype=np.float32), 0, -1)
+    ends, sides = caps_depth(region, grid)
+    return (ends > 0) & (sides > 0)
+
+
+def largest(mask: np.ndarray) -> np.ndarray:
+    """The largest component (nx, ny, nz), of 26 neighbours."""
+    label, _ = ndimage.label(mask, np.ones((3, 3, 3)))
+    count = np.bincount(label.ravel(), minlength=2)
+    count[0] = 0
+    return (label == count.argmax()) & mask
+
+
+def strut_curve(
+    branch: Branch, line: np.ndarray, volume: float, radii: np.ndarray, excess: np.ndarray
+) -> Curve:
+    """The centre line of a strut of this volume between the balls of its junctions, of radii (j,)."""
+    length = arc_length(line)[-1]
+    radius = np.sqrt(max(volume, LEAST_AREA) / (np.pi * length))
+    trims = np.array([0.0 if end == FREE_END else radii[end] for end in branch.ends])
+    if length - trims.sum() < 2 * radius:
+        trims = np.minimum(trims, TRIMMED * length)
+    return centre_line(line, (trims[0], length - trims[1]), radius, excess)
+
+
+def crossings(graph: StrutGraph, curves: list[Curve]) -> np.ndarray:
+    """Junctions (j, 3) nearest to the lines of their struts, continued straight on."""
+    matrix = np.tile(DOUBT * np.eye(3), (len(graph.junctions), 1, 1))
+    right = DOUBT * graph.junctions
+    for branch, curve in zip(graph.branches, curves, strict=True):
+        for end, side in zip(branch.ends, (-1, 1), strict=True):
+            if end == FREE_END:
+                continue
+            s = np.array([curve.middle + side * curve.half])
+            tangent = curve.tangent(s)[0]
+            across = np.eye(3) - np.outer(tangent, tangent) / (tangent @ tangent)
+            matrix[end] += across
+            right[end] += across @ curve(s)[0]
+    step = np.linalg.solve(matrix, right[..., None])[..., 0] - graph.junctions
+    far = np.linalg.norm(step, axis=1, keepdims=True)
+    return graph.junctions + step * np.minimum(1, ASTRAY / np.maximum(far, ASTRAY))
+
+
+def assembled(
+    graph: StrutGraph, curves: list[Curve], owned: list, solid: Solid
+) -> tuple[Frame, float]:
+    """Pieces along all curves, and from their ends straight to the junctions; the median length of the
+    struts."""
+    junctions = crossings(graph, curves)
+    points, pieces, area, count = [junctions], [], [], len(junctions)
+    for branch, curve, own in zip(graph.branches, curves, owned, strict=True):
+        s = stations(branch, curve, junctions)
+        first, second = (np.array([end] if end != FREE_END else [], int) for end in branch.ends)
+        inner = count + np.arange(len(s))
+        chain = np.concatenate([first, inner, second])
+        at = np.concatenate([s[:1][: len(first)], (s[1:] + s[:-1]) / 2, s[-1:][: len(second)]])
+        points.append(curve(s))
+        pieces.append(np.stack([chain[:-1], chain[1:]], axis=1))
+        area.append(sections_of(curve, at, solid.voxels[own], solid.share[own]))
+        count += len(s)
+    frame = Frame(*(np.concatenate(part) for part in (points, pieces, area)))
+    return frame, float(np.median([len(part) * PIECE for part in pieces]))
+
+
+def stations(branch: Branch, curve: Curve, junctions: np.ndarray) -> np.ndarray:
+    """Arc lengths (g,) of a curve where its nodes are: none so near to a junction that the piece
+    between them would be short."""
+    s = curve.middle + curve.half * np.linspace(-1, 1, max(2, round(2 * curve.half / PIECE)) + 1)
+    near = [
+        int(end != FREE_END and np.linalg.norm(curve(s[[k]])[0] - junctions[end]) < SHORTEST)
+        for end, k in zip(branch.ends, (0, -1), strict=True)
+    ]
+    return s[near[0] : len(s) - near[1]]
+
+
+def sections_of(
+    curve: Curve, stations: np.ndarray, voxels: np.ndarray, share: np.ndarray
+) -> np.ndarray:
+    """Areas (g,) at arc lengths (g,) of a curve from the shares (q,) of solid of its voxels (q, 3)."""
+    line = curve(np.linspace(curve.middle - curve.half, curve.middle + curve.half, len(voxels) + 2))
+    s = curve.projected(voxels, curve.middle - curve.half + along(line, voxels))
+    radius = np.sqrt(max(share.sum(), LEAST_AREA) / (2 * curve.half * np.pi))
+    return np.maximum(section_areas(stations, s, share, max(radius / 2, 0.5)), LEAST_AREA)
+
+
+def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
+    """Which nodes (n,) may be loaded from outside: those at a cut, and the nearest to each patch of the
+    solid (nx, ny, nz) there, where a strut goes on that may be too short here to have nodes."""
+    out = cut_depth(region, points) <= CUT
+    grid = np.moveaxis(np.indices(mask.shape, dtype=np.float32), 0, -1)
+    label, count = ndimage.label(mask & (cut_depth(region, grid) <= CUT), np.ones((3, 3, 3)))
+    if count:
+        patches = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
+        out[cKDTree(points).query(patches)[1]] = True
+    return out
+
+
+def cut_depth(region: Region, points: np.ndarray) -> np.ndarray:
+    """Depth (...) of points (..., 3) below the surfaces of the region that cut through the solid."""
+    caps, sides = caps_depth(region, points)
+    return np.minimum(caps, sides) if region.cut_sides else caps
+
+
+def save_frame(path: str | Path, held: StrutFrame) -> None:
+    """HDF5."""
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        for name in ("points", "pieces", "area"):
+            file[name] = getattr(held.frame, name)
+        file["loaded"] = held.loaded
+        file.attrs.update({"span": held.span, "unit": "voxel of the binned image"})
+
+
+def load_frame(path: str | Path) -> StrutFrame:
+    """What `save_frame` wrote."""
+    with h5py.File(path) as file:
+        frame = Frame(*(file[name][:] for name in ("points", "pieces", "area")))
+        return StrutFrame(frame, file["loaded"][:], float(file.attrs["span"]))

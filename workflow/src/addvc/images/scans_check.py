@@ -1,0 +1,109 @@
+"""All scans of a case at once, before any work: there, whole, of one size and type. Headers only."""
+
+import hashlib
+import os
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from addvc.config import scan_files, scan_paths, scan_settings
+from addvc.errors import ConfigError, ScanError
+from addvc.images.scans import Crop, Scan, ScanFormat, binned_shape, open_scan
+
+FINGERPRINT_BYTES = 2**20
+
+
+class Checked(NamedTuple):
+    """A scan, and its size (x, y, z) once cropped and binned."""
+
+    scan: Scan
+    binned: tuple[int, ...]
+
+
+def check_scans(
+    paths: Sequence[str | os.PathLike], fmt: ScanFormat | None, factor: int = 1, crop: Crop = None
+) -> list[dict]:
+    """Open every scan and compare sizes and grey types.
+
+    Gives for each: path, shape and binned_shape (x, y, z), dtype, bytes on disk, and fingerprint,
+    a sha256 of the first MB and the size. The fingerprint tells scans apart in a record of
+    provenance; it is no checksum, since a change behind the first MB leaves it as it is. Raises
+    ScanError with all that is wrong.
+    """
+    found, problems = open_all(paths, fmt or ScanFormat(), factor, crop)
+    refuse(problems)
+    return [_record(checked) for checked in found]
+
+
+def check_headers(config: dict) -> None:
+    """ScanError with all that is wrong with the scans of a configuration, as a dry run can tell it.
+
+    Of a scan in one file a slice the first and last are opened: 1,654 take 0.4 s on a local disk."""
+    there, problems = [], []
+    for path in dict.fromkeys(scan_paths(config)):
+        try:
+            scan_files(path)
+            there.append(path)
+        except ConfigError as error:
+            problems.append(str(error))
+    known = scan_settings(config, 0)
+    form = ScanFormat(**known["format"])
+    refuse(problems + open_all(there, form, known["bin"], known["crop"], every_slice=False)[1])
+
+
+def open_all(
+    paths: Sequence[str | os.PathLike],
+    fmt: ScanFormat,
+    factor: int,
+    crop: Crop,
+    every_slice: bool = True,
+) -> tuple[list[Checked], list[str]]:
+    """The scans that can be used, and what is wrong with the others."""
+    found, problems = [], []
+    for path in paths:
+        try:
+            scan = open_scan(path, fmt, every_slice)
+            _check_like(scan, found[0].scan if found else scan)
+            found.append(Checked(scan, binned_shape(scan, factor, crop)))
+        except ScanError as error:
+            problems.append(str(error))
+    return found, problems
+
+
+def refuse(problems: Sequence[str]) -> None:
+    """ScanError with all problems, if there are any; a message that several scans share once."""
+    different = list(dict.fromkeys(problems))
+    if len(different) == 1:
+        raise ScanError(different[0])
+    if different:
+        lines = "".join(f"\n- {problem}" for problem in different)
+        raise ScanError(f"{len(different)} things are wrong with the scans, none may be:{lines}")
+
+
+def _check_like(scan: Scan, first: Scan) -> None:
+    """ScanError unless a scan has the size and the grey type (in either byte order) of the first."""
+    if scan.shape != first.shape:
+        raise ScanError(
+            f"{scan.path} has {scan.shape} voxels, but {first.path} has {first.shape}; "
+            "all states must have one size: crop or export them alike"
+        )
+    if scan.dtype.newbyteorder("=") != first.dtype.newbyteorder("="):
+        raise ScanError(
+            f"{scan.path} has values of {scan.dtype.name}, but {first.path} of {first.dtype.name}; "
+            "the grey levels of all states are compared: export them in one type"
+        )
+
+
+def _record(checked: Checked) -> dict:
+    """What check_scans says of one scan."""
+    scan = checked.scan
+    size = sum(file.stat().st_size for file in scan.source.files)
+    with open(scan.source.files[0], "rb") as file:
+        digest = hashlib.sha256(file.read(FINGERPRINT_BYTES) + str(size).encode())
+    return {
+        "path": str(scan.path),
+        "shape": list(scan.shape),
+        "binned_shape": list(checked.binned),
+        "dtype": str(scan.dtype),
+        "bytes": size,
+        "fingerprint": digest.hexdigest(),
+    }

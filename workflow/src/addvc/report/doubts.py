@@ -1,0 +1,119 @@
+"""What to distrust in a result: the section of the first page that is never silently empty."""
+
+from addvc.report.page_tables import figure, micro_name
+
+NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
+
+
+def warnings(summary: dict) -> list[str]:
+    """What to distrust; "None." when there is nothing, so that the section is never silently empty."""
+    found = [line for state in summary["states"] for line in state_warnings(state, summary)]
+    micro = summary["meshes"][micro_name(summary)]
+    kept = micro["kept_fraction"] * micro["voxel_kept_fraction"]
+    if kept < 0.9:
+        found.append(
+            f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
+            "and was left out; lower mesh.size, the porosity or images.blur."
+        )
+    found += topology_warnings(summary.get("topology"))
+    if not any(state[micro_name(summary)]["error"] for state in summary["states"]):
+        found.append(
+            "- The error on these images is not known: the residual and the ultimate error "
+            "bound it from below only. `virtual` in the configuration measures it for a "
+            "smooth field on your own reference."
+        )
+    found += [
+        f"- The synthetic test is not what it claims to be: {check_words(check)}."
+        for check in failed_checks(summary)
+    ]
+    return found or ["None."]
+
+
+def topology_warnings(counts: dict | None) -> list[str]:
+    """One line when the mesh of the struts has stubs, necks or welds."""
+    names = {
+        "stubs": "dangling stubs",
+        "necks": "necks thinner than a square voxel",
+        "welds": "welds torn by the displacement",
+    }
+    some = [f"{counts[key]} {name}" for key, name in names.items() if counts and counts[key]]
+    if not some:
+        return []
+    return [
+        f"- The mesh of the struts has {', '.join(some)} (0 of each in a foam): see the figure of "
+        "its topology, and geometry/topology.json for where. Elastic energy (`corotational`) holds "
+        "them, so its results can be used; trust `eq10` least there. For fewer of them, first lower "
+        "images.blur, then mesh.size; a porosity that is too high breaks struts too."
+    ]
+
+
+def state_warnings(state: dict, summary: dict) -> list[str]:
+    """What to distrust of one state: loops that did not end, nodes in doubt, a failure."""
+    found = []
+    for mesh in summary["meshes"]:
+        one = state[mesh]
+        if not one["converged"]:
+            found.append(
+                f"- State {state['state']}, {mesh}: the loop did not end in "
+                f"{one['iterations']} iterations (last rms(du) {figure(one['last_step'], '.1e')} "
+                "voxel). Look at the residual maps (Fig. 13); a longer "
+                "regularisation length or a better start may help."
+            )
+    doubtful = 1 - state[micro_name(summary)]["valid_nodes"]
+    if state["verdict"] == "flagged" and doubtful > 0.05:
+        found.append(
+            f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
+            "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
+            "look at the residual maps (Fig. 13)."
+        )
+    struts = state.get("struts") or {"valid": 0, "flagged": 0}
+    count = struts["valid"] + struts["flagged"]
+    if struts["flagged"] > 0.1 * count:
+        found.append(
+            f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
+            "flagged: broken by the threshold, not measured, or on nodes in doubt. What is said of "
+            "bending leaves them out; the scene shows where they are."
+        )
+    if state["verdict"] == "failed":
+        found.append(
+            f"- State {state['state']} could not be registered: at least half of its nodes "
+            "have a residual far above the noise of the images."
+        )
+    return found + residual_warnings(state, micro_name(summary))
+
+
+def residual_warnings(state: dict, micro: str) -> list[str]:
+    """Whether micro DVC leaves far more of the residual than noise explains: some struts are lost."""
+    sigma, alone = state[micro]["residual_std"], state.get("noise_std")
+    if (
+        sigma is None
+        or alone is None
+        or sigma <= NOISE_TIMES * alone
+        or state["verdict"] == "failed"
+    ):
+        return []
+    return [
+        f"- State {state['state']}, {micro}: the residual has a standard deviation of {sigma:.2f} grey "
+        f"levels, {sigma / alone:.1f} times that of noise alone (at most {NOISE_TIMES:g}): some struts "
+        "are not where they were put, or the contrast of the scans differs. Look at Fig. 13 for where, "
+        "leave out what is not `valid`; raise micro.mending, or say images.grey: global."
+    ]
+
+
+def failed_checks(summary: dict) -> list[dict]:
+    """Checks of the twin that do not hold; none for other images."""
+    return (summary.get("twin_checks") or {"failed": []})["failed"]
+
+
+def check_words(check: dict) -> str:
+    """A check that does not hold: its value, its limit, its remedy."""
+    unit = "" if check["unit"] == "–" else f" {check['unit']}"
+    limits = [
+        f"{word} {check[key]:.4g}"
+        for word, key in (("at least", "low"), ("at most", "high"))
+        if check[key] is not None
+    ]
+    return (
+        f"{check['name']} is {figure(check['value'], '.4g')}{unit} ({', '.join(limits)}); "
+        f"{check['remedy']}"
+    )
