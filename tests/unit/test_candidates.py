@@ -9,14 +9,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from addvc.correlation.candidates import candidate
 from addvc.correlation.clear import clear_voxels
 from addvc.correlation.gauss_newton import Solution
-from addvc.correlation.meso import MesoOptions, chosen_register, meso_system
+from addvc.correlation.meso import MesoOptions, chosen_register, meso_dvc, meso_system
 from addvc.correlation.register import Stop, register
 from addvc.correlation.spline_grid import grid_over
 from addvc.correlation.store import save_field, save_solution
 from addvc.correlation.ultimate import fft_shift
 from addvc.errors import CorrelationError
+from addvc.fem import solver
 from addvc.fem.io import write_mesh
 from addvc.images.scans_store import save_volume
+from addvc.images.spline import interpolating_coefficients
 
 AXIS = 1
 SLOPE = np.array([[0.01, 0.03, 0], [-0.02, -0.05, 0.01], [0, 0.02, 0.04]])
@@ -133,7 +135,7 @@ def test_quadrature_of_clear_voxels_is_a_part_of_all(rng, box):
     mesh = box((5, 5, 5), (34, 34, 34), (2, 2, 2))
     every = meso_system(mesh, image, MesoOptions(AXIS, 8.0, 40.0)).reference.quadrature
     some = meso_system(mesh, image, MesoOptions(AXIS, 8.0, 40.0, clear=8.0)).reference.quadrature
-    clear = clear_voxels(image, 1, 8.0)[tuple(every.points.astype(int).T)]
+    clear = clear_voxels(image, 1, 8.0)[tuple(np.rint(every.points).astype(int).T)]
     assert_array_equal(some.points, every.points[clear])
     assert_array_equal(some.shape, every.shape[clear])
 
@@ -147,3 +149,15 @@ def test_nodes_in_the_void_do_not_make_the_coarsest_mesh_singular(rng, box):
     assert (system.reference.quadrature.points[:, 0] < 30).all()
     load = rng.normal(size=mesh.points.size)
     assert np.isfinite(system.factor.solve(load)).all()
+
+
+def test_meso_dvc_without_a_factor_finds_the_same(speckle, box, monkeypatch):
+    image = interpolating_coefficients(speckle((48, 48, 48)))
+    moved = fft_shift(image, (0.3, -0.2, 0.4))
+    mesh, options = box((8, 8, 8), (40, 40, 40), (4, 4, 4)), MesoOptions(AXIS, 8.0, 40.0)
+    rest = {"rest": np.zeros_like}
+    direct, _ = meso_dvc(mesh, [image, moved], options, rest, "meso")
+    monkeypatch.setattr(solver, "DIRECT", 0)
+    iterative, notes = meso_dvc(mesh, [image, moved], options, rest, "meso")
+    assert notes["best"] == "rest" and iterative.iterations == direct.iterations
+    assert_allclose(iterative.u, direct.u, atol=1e-8)

@@ -8,6 +8,7 @@ from addvc.errors import MeshError
 from addvc.fem.mesh import cell_volumes
 from addvc.fem.quadrature import (
     barycentric,
+    dither,
     gauss_points,
     interpolate,
     lattice_points,
@@ -65,6 +66,24 @@ def test_voxel_on_a_shared_face_goes_to_the_cell_with_the_smaller_number(mesh):
 def test_half_voxel_box_counts_its_voxels_as_its_volume(box):
     mesh = box((1.5, 2.5, 0.5), (13.5, 17.5, 12.5), (3, 5, 4), shake=0.2)
     assert len(voxel_points(mesh, SHAPE)) == round(cell_volumes(mesh).sum())
+
+
+def test_dithered_points_stay_in_their_voxels_and_are_carried_where_they_are(mesh):
+    centres, points = voxel_points(mesh, SHAPE), voxel_points(mesh, SHAPE, dithered=True)
+    assert np.abs(points.points - centres.points).max() <= 0.5
+    assert_array_equal(points.cell, centres.cell)
+    assert_array_equal(points.weight, centres.weight)
+    back = interpolate(mesh.cells, points.cell, points.shape, mesh.points)
+    assert_allclose(back, points.points, atol=1e-12)
+
+
+def test_dither_fills_voxels_evenly_and_stays_in_the_image():
+    centres = np.argwhere(np.ones(SHAPE)).astype(float)
+    assert dither(centres, SHAPE).min() == 0
+    assert (dither(centres, SHAPE) <= np.array(SHAPE) - 1).all()
+    inner = centres[((centres > 0) & (centres < np.array(SHAPE) - 1)).all(axis=1)]
+    count, _ = np.histogramdd(dither(inner, SHAPE) - inner, bins=4, range=[(-0.5, 0.5)] * 3)
+    assert_allclose(count / count.mean(), 1, atol=0.15)
 
 
 def test_mesh_may_reach_beyond_the_image(box):

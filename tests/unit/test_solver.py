@@ -1,4 +1,4 @@
-"""The direct solver: exact to round-off for any numbering, and plain about singular systems."""
+"""The solvers: exact to round-off for any numbering, and plain about singular systems."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import sparse
 
 from addvc.errors import CorrelationError
+from addvc.fem import solver as solvers
 from addvc.fem.mesh import Mesh
 from addvc.fem.operators import laplacian, stiffness, vectorised
-from addvc.fem.solver import dissection, factorise
+from addvc.fem.solver import conjugate_gradients, dissection, factorise, solver
 
 
 @pytest.fixture
@@ -81,3 +82,40 @@ def test_singular_matrix_is_an_error(box, count, operator):
 def test_indefinite_matrix_is_an_error(mesh):
     with pytest.raises(CorrelationError, match=r"system of \d+ unknowns is not positive definite"):
         factorise(-1.0 * system(mesh))
+
+
+@pytest.fixture
+def smooth(mesh, rng):
+    """A matrix like those of meso DVC: a mass that differs from node to node, and a Laplacian."""
+    slope = rng.normal(size=(len(mesh.points), 3, 3))
+    data = sparse.block_diag(slope @ slope.transpose(0, 2, 1))
+    return (data + 2.0 * vectorised(laplacian(mesh))).tocsr()
+
+
+def test_conjugate_gradients_solve_as_the_factor_does(smooth, rng):
+    b = rng.standard_normal(smooth.shape[0])
+    x, exact = conjugate_gradients(smooth).solve(b), factorise(smooth).solve(b)
+    assert np.linalg.norm(smooth @ x - b) < 1.01e-10 * np.linalg.norm(b)
+    assert_allclose(x, exact, atol=1e-7 * np.abs(exact).max())
+    assert_array_equal(conjugate_gradients(smooth).solve(b), x)
+    assert not conjugate_gradients(smooth).solve(0 * b).any()
+
+
+def test_large_systems_get_no_factor(smooth, monkeypatch):
+    assert solver(smooth).nonzeros == factorise(smooth).nonzeros
+    monkeypatch.setattr(solvers, "DIRECT", smooth.shape[0] - 1)
+    assert solver(smooth).nonzeros == smooth.tobsr((3, 3)).nnz
+
+
+def test_steps_that_do_not_do_are_told(smooth, rng, monkeypatch):
+    monkeypatch.setattr(solvers, "MOST_STEPS", 3)
+    with pytest.raises(
+        CorrelationError, match=r"after 3 steps .* is left \(limit 1e-10\); use larger"
+    ):
+        conjugate_gradients(smooth).solve(rng.standard_normal(smooth.shape[0]))
+
+
+def test_a_node_that_nothing_holds_is_told(smooth):
+    loose = sparse.block_diag([smooth, sparse.csr_matrix((3, 3))])
+    with pytest.raises(CorrelationError, match=r"not positive definite .*eigenvalue of"):
+        conjugate_gradients(loose)

@@ -1,5 +1,8 @@
 # Initialisation and meso DVC: section 3.2, Eq. 6, 7, 9.
 
+# What a correlation on a mesh takes, over the size of both images: most of it holds its voxels.
+VOXELS = 8.0 if config["meso"]["clear"] > 0 else 30.0
+
 
 rule start:
     input:
@@ -86,7 +89,7 @@ rule best_start:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1500, 30.0),
+        mem_mb=memory(1500, VOXELS),
         runtime=20,
     params:
         code=code("meso/best_start.py"),
@@ -116,7 +119,7 @@ rule meso_dvc:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1500, 30.0),
+        mem_mb=memory(1500, VOXELS),
         runtime=60,
     params:
         code=code("meso/meso_dvc.py"),

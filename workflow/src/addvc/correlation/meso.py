@@ -30,7 +30,7 @@ from addvc.fem.assembly import node_pattern
 from addvc.fem.mesh import Mesh
 from addvc.fem.operators import laplacian, vectorised
 from addvc.fem.quadrature import Quadrature, lattice_points, voxel_points
-from addvc.fem.solver import factorise
+from addvc.fem.solver import solver
 from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to_coarse
 
 log = logging.getLogger(__name__)
@@ -71,9 +71,10 @@ def start_options(section: dict, size: float, axis: int) -> MesoOptions:
 def meso_quadrature(
     mesh: Mesh, coefficients: np.ndarray, clear: float, most: float = np.inf
 ) -> Quadrature:
-    """Voxel centres inside tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
+    """A point of each voxel in tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
     chosen = clear_voxels(coefficients, 1, clear) if clear > 0 else None
-    return voxel_points(mesh, coefficients.shape, thinning(coefficients.size, most), chosen)
+    stride = thinning(coefficients.size, most)
+    return voxel_points(mesh, coefficients.shape, stride, chosen, dithered=True)
 
 
 def thinning(voxels: int, most: float) -> int:
@@ -88,7 +89,7 @@ def meso_system(
     lines: list | None = None,
     most: float = np.inf,
 ) -> System:
-    """Eq. 9 with T = L on one mesh: I_r sampled at voxel centres, and A = H + M factorised.
+    """Eq. 9 with T = L on one mesh: I_r sampled at its voxels, and a solver of A = H + M.
 
     `lines` are the grid lines of a hexahedral grid."""
     if lines is None:
@@ -99,9 +100,9 @@ def meso_system(
     reference = reference_on(mesh, quadrature, coefficients)
     h = hessian(reference, node_pattern(mesh))
     if options.cutoff == 0:
-        return System(reference, None, factorise(h + held(mesh, h)))
+        return System(reference, None, solver(h + held(mesh, h)))
     extra = diffusion(mesh, h, options.cutoff, options.period, options.axis)
-    return System(reference, extra, factorise(h + extra))
+    return System(reference, extra, solver(h + extra))
 
 
 def held(mesh: Mesh, h: sparse.bsr_matrix) -> sparse.spmatrix:

@@ -14,21 +14,21 @@ from addvc.correlation.metric import (
     residual_statistics,
     right_hand_side,
 )
-from addvc.fem.solver import Factor
+from addvc.fem.solver import ConjugateGradients, Factor
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """S(u) + u^T M u + 2 u^T f on one mesh: I_r sampled, M, and the factor of A = H + M.
+    """S(u) + u^T M u + 2 u^T f on one mesh: I_r sampled, M, and what solves A = H + M.
 
     `load` f (3 n,): of a regularisation that is not at rest at u = 0. `scale` s of the residual
     (grey levels): S is then the robust one of Geman and McClure."""
 
     reference: Reference
     regularisation: sparse.spmatrix | None
-    factor: Factor
+    factor: Factor | ConjugateGradients
     load: np.ndarray | None = None
     scale: float | None = None
 

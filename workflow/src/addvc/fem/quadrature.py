@@ -42,11 +42,13 @@ def voxel_points(
     image_shape: tuple[int, int, int],
     stride: int = 1,
     chosen: np.ndarray | None = None,
+    dithered: bool = False,
 ) -> Quadrature:
     """Centres of the voxels inside a tetrahedral mesh, each owned by one cell, weight 1.
 
     With a `stride` one voxel in stride**3 is kept and weighs as much; of these only the `chosen`
-    ones, bool of `image_shape`. Raises MeshError when no voxel is inside."""
+    ones, bool of `image_shape`. `dithered`: not the centre of each but a point of it (`dither`), which
+    may lie beyond its cell by as little. Raises MeshError when no voxel is inside."""
     owner = voxel_owner(mesh.points, mesh.cells, np.asarray(image_shape, dtype=np.int64))
     if chosen is not None:
         owner[~chosen] = -1
@@ -58,21 +60,54 @@ def voxel_points(
             f"spans {mesh.points.min(0)} to {mesh.points.max(0)}; check the units"
         )
     cell = owner[kept].ravel()[index]
-    place = np.unravel_index(index, owner[kept].shape)
-    points = stride * np.column_stack(place).astype(np.float64)
+    points = np.empty((len(index), 3))
+    for d, place in enumerate(np.unravel_index(index, owner[kept].shape)):
+        points[:, d] = stride * place
+    if dithered:
+        points = dither(points, image_shape)
     shape = barycentric(mesh, cell, points)
     return Quadrature(cell, shape, points, np.full(len(index), float(stride**3)))
+
+
+def dither(centres: np.ndarray, image_shape: tuple[int, int, int]) -> np.ndarray:
+    """A point of each voxel, given its centre (Q, 3), such that together they fill a voxel evenly.
+
+    The spline of Eq. 4 depends a little on where in a voxel it is taken: where an image has moved by
+    half a voxel, all centres along a flat face, such as a platen's, err alike. Points spread over
+    their voxels do not. Additive recurrence R3 [Roberts 2018] by the number of the voxel; no point
+    leaves the image."""
+    ratio = 1.2207440846057596  # g**4 = g + 1
+    step = ratio ** -np.arange(1.0, 4.0)
+    number = (centres[:, 0] * image_shape[1] + centres[:, 1]) * image_shape[2] + centres[:, 2]
+    moved = np.empty_like(centres)
+    for d, last in enumerate(np.array(image_shape) - 1.0):
+        moved[:, d] = np.clip(centres[:, d] + number * step[d] % 1 - 0.5, 0, last)
+    return moved
 
 
 def barycentric(mesh: Mesh, cell: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Eq. A1: N (Q, 4) at points (Q, 3) of the given tetrahedra (Q,); negative when outside."""
     few = len(cell) < len(mesh.cells)  # then invert for each point, not for each cell
-    cells, row = (mesh.cells[cell], slice(None)) if few else (mesh.cells, cell)
+    cells, row = (mesh.cells[cell], np.arange(len(cell))) if few else (mesh.cells, cell)
     origin = mesh.points[cells[:, 0]]
-    edges = mesh.points[cells[:, 1:]] - origin[:, None]
-    inverse = np.linalg.inv(edges)  # rows: x = xi @ edges
-    xi = np.einsum("qi,qij->qj", points - origin[row], inverse[row])
-    return np.column_stack([1 - xi.sum(axis=1), xi])
+    inverse = np.linalg.inv(mesh.points[cells[:, 1:]] - origin[:, None])  # rows: x = xi @ edges
+    return cell_coordinates(origin, inverse, row, points)
+
+
+@nb.njit(parallel=True, cache=True)
+def cell_coordinates(origin, inverse, cell, points):
+    """1 - sum xi and xi = (x - origin) @ inverse in the cell of each point, (Q, 4)."""
+    out = np.empty((len(cell), 4))
+    for q in nb.prange(len(cell)):
+        e, total = cell[q], 0.0
+        for j in range(3):
+            xi = 0.0
+            for i in range(3):
+                xi += (points[q, i] - origin[e, i]) * inverse[e, i, j]
+            out[q, 1 + j] = xi
+            total += xi
+        out[q, 0] = 1 - total
+    return out
 
 
 @nb.njit(cache=True)
