@@ -91,7 +91,7 @@ class Problem:
         load, stiff = forces(self.held.frame, motion, self.nu)
         gap = self.gap @ stiff
         data, balance = (slopes.T @ slopes).tocsc(), (gap.T @ gap).tocsc()
-        scale = np.median(data.diagonal())
+        scale = middle(data)
         w, mu = weight * scale / middle(balance), held * scale / middle(stiff)
         right = slopes.T @ self.error(motion).ravel() - w * (gap.T @ (self.gap @ load)) - mu * load
         damping = DAMPED * scale * sparse.identity(len(right))
