@@ -271,11 +271,28 @@ def test_without_valid_nodes_or_a_frame_nothing_changes(pressed, caplog):
     held, _, points = pressed
     measured = Measured(points, np.zeros_like(points), noise_of(points, 2))
     found, notes = balanced(held, measured, np.zeros(len(points)), NU)
-    assert found is measured and notes == {"weight": None} and "WARNING" in caplog.text
+    assert (
+        found is measured and notes == {"weight": None, "carrying": 0} and "WARNING" in caplog.text
+    )
     assert micro_fields(None, measured, np.ones(len(points)), NU) == ({"": measured}, None)
     nothing = StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
                          np.zeros(0, bool), 0.0)  # fmt: skip
-    assert balanced(nothing, measured, np.ones(len(points)), NU)[1] == {"weight": None}
+    assert balanced(nothing, measured, np.ones(len(points)), NU)[1]["weight"] is None
+
+
+@pytest.mark.parametrize(("reach", "known"), [(0.3, False), (0.7, True)])
+def test_half_of_the_frame_must_have_been_seen(pressed, reach, known):
+    """With fewer nodes most of the matrix has no data, which must not be its scale."""
+    held, motion, points = pressed
+    draws = noise_of(points, 4)
+    u = problem(pressed, draws[0]).now - points
+    valid = points[:, 0] < reach * points[:, 0].max()
+    notes = balanced(held, Measured(points, u, draws[1:]), valid, NU)[1]
+    assert (notes["weight"] is not None) == known
+    assert (notes["carrying"] >= 0.5) == known
+    few = points[:, 0] < 0.3 * points[:, 0].max()
+    task = Problem(held, Attached.of(held.frame, points[few]), (points + u)[few], NU)
+    assert fitted(task, motion, 1e3) is not None
 
 
 def cross_image(shape=(48, 48, 48), radius=1.8):

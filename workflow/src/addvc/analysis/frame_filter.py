@@ -54,8 +54,18 @@ DOUBTED = 2.0
 FEW = 4
 """Draws that choose the weight: each is a sum over all nodes."""
 
+CARRYING = 0.5
+"""Share of the nodes of the frame that valid nodes of the mesh must be nearest to: of fewer, what was
+not seen decides."""
+
 REACH = 3.5
 """Farthest node of the mesh that moves with the frame, voxels from its axis."""
+
+UNBALANCED = (
+    "WARNING: struts are as measured: %.0f %% of the frame carry valid nodes of the mesh (%.0f %% are "
+    "needed), or no equilibrium explains the displacement better than noise does; "
+    "mesh.size or the threshold may be too large, or set struts.equilibrium: false"
+)
 
 ITERATIONS, SETTLED = 8, 5e-3
 """Of Gauss-Newton for each weight, at most, and the rms of the last step of the nodes of the mesh,
@@ -117,6 +127,11 @@ class Fit:
     kept: float
     validation: float
     helps: bool
+
+    @property
+    def excess(self) -> float:
+        """The misfit over what the noise explains, at least one."""
+        return max(1.0, (self.misfit / self.taken) ** 0.5)
 
 
 def solver(matrix: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray] | None:
@@ -202,33 +217,37 @@ def balanced(
     """What was measured, with its draws of the noise, as the frame moves it at nodes within REACH, by
     those that are `valid` (n,); nothing changes where no motion is found. Notes: the weight, the rms
     misfit, by how much it exceeds what the noise at rest explains (the draws are scaled up so that it
-    does explain it), the share of the noise that is left."""
-    use = np.zeros(len(valid), dtype=bool)
-    if len(held.frame.pieces):
-        attached = Attached.of(held.frame, measured.points)
-        near = attached.distance < REACH
-        use = near & (valid > 0)
-    fit = None
-    if use.sum() > NEAR:
-        points, draws = measured.points[use], measured.draws[:, use]
-        problem = Problem(held, attached[use], points + measured.u[use], nu)
-        fit = best_fit(problem, first_motion(held.frame, points, measured.u[use]), draws[:FEW])
+    does explain it), the share of the noise that is left; the share of the frame that was seen."""
+    attached = Attached.of(held.frame, measured.points) if len(held.frame.pieces) else None
+    near = np.zeros(len(valid), dtype=bool) if attached is None else attached.distance < REACH
+    use = near & (valid > 0)
+    share = len(np.unique(attached.ends[use])) / len(held.frame.points) if use.any() else 0.0
+    fit, draws = None, measured.draws[:, use]
+    if share >= CARRYING and use.sum() > NEAR:
+        points, u = measured.points[use], measured.u[use]
+        problem = Problem(held, attached[use], points + u, nu)
+        fit = best_fit(problem, first_motion(held.frame, points, u), draws[:FEW])
     if fit is None:
-        log.warning(
-            "WARNING: no equilibrium of the frame explains the displacement better than noise does; "
-            "struts are as measured"
-        )
-        return measured, {"weight": None}
-    scale = max(1.0, (fit.misfit / fit.taken) ** 0.5)
-    u, left = measured.u.copy(), measured.draws.copy()
-    u[near] = attached[near].moved(fit.motion) - measured.points[near]
-    left[:, near] = scale * filtered(
-        problem, fit.motion, fit.weight, draws, attached[near].slopes(fit.motion)
-    )
-    return Measured(measured.points, u, left), {
-        "weight": float(fit.weight), "misfit": fit.misfit**0.5, "misfit_over_noise": scale,
-        "noise_left": fit.kept**0.5,
+        log.warning(UNBALANCED, 100 * share, 100 * CARRYING)
+        return measured, {"weight": None, "carrying": share}
+    return carried_along(problem, fit, draws, attached, measured), {
+        "weight": float(fit.weight), "carrying": share, "misfit": fit.misfit**0.5,
+        "misfit_over_noise": fit.excess, "noise_left": fit.kept**0.5,
     }  # fmt: skip
+
+
+def carried_along(
+    problem: Problem, fit: Fit, draws: np.ndarray, attached: Attached, measured: Measured
+) -> Measured:
+    """The motion of a fit at all nodes within REACH, and what it leaves of draws (d, k, 3) of the noise
+    at those of the problem."""
+    near = attached.distance < REACH
+    u, left, own = measured.u.copy(), measured.draws.copy(), attached[near]
+    u[near] = own.moved(fit.motion) - measured.points[near]
+    left[:, near] = fit.excess * filtered(
+        problem, fit.motion, fit.weight, draws, own.slopes(fit.motion)
+    )
+    return Measured(measured.points, u, left)
 
 
 def micro_fields(
