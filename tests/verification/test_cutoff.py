@@ -61,6 +61,17 @@ def test_short_waves_want_a_shorter_cut_off_than_rest(problem):
     assert rest == LADDER.longest and rough < 0
 
 
+def test_noise_that_the_residual_does_not_hold_is_none(problem):
+    """The texture of a void that is not empty: here the noise is said to be ten times what it is."""
+    rest = np.zeros_like(problem.reference.mesh.points)
+    deformed = image(lambda x: x, 31)
+    system = stage_system(problem, PLAN[0], rest)
+    u = register(system, deformed, rest, PLAN[0].stop).u
+    shares = [trial(system, deformed, u, Ladder(Noise(t * NOISE, 0.0))).share for t in (1, 10)]
+    assert shares[0] == pytest.approx(1, abs=0.2)
+    assert shares[1] == pytest.approx(0.01, rel=0.2)
+
+
 @pytest.mark.parametrize("period", [12, 40])
 def test_the_choice_is_close_to_the_best_of_the_ladder(problem, period):
     wave, back = bowed(0.6, period)

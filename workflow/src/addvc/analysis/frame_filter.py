@@ -19,7 +19,8 @@ if by Stein's estimate [Stein1981] the filtered displacement is nearer the truth
 
     |u - u_w|^2 - s^2 E|n|^2 + 2 s^2 E n . S n < s^2 E|n|^2,
 
-even if the noise were s = 2 times that of the draws; else struts are measured as they are.
+even if the noise were s = 2 times that of the draws; else struts are measured as they are. The truth
+of the twin is a network of beams too, which flatters the filter; hinging struts are the test against it.
 """
 
 import logging
@@ -48,7 +49,7 @@ DAMPED = 1e-4
 little at a time."""
 
 DOUBTED = 2.0
-"""By how much the noise may exceed its draws: over the states of the default twin up to 1.6 times."""
+"""By how much the noise may exceed its draws, which know of no robust weights and no lost struts."""
 
 FEW = 4
 """Draws that choose the weight: each is a sum over all nodes."""

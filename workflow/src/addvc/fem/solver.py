@@ -16,9 +16,10 @@ from scipy import sparse
 from addvc.errors import CorrelationError
 
 LEAST_PIVOT = 1e-12
-DIRECT = (
-    150_000  # unknowns: the factor of a meso mesh takes some 3 GB, that of three times as many 11
-)
+
+DIRECT = 150_000
+"""Unknowns: the factor of a meso mesh takes some 3 GB, that of three times as many 11."""
+
 ACCURACY = 1e-10  # of conjugate gradients, |b - A x| / |b|
 MOST_STEPS = 2000
 NOT_HELD = (
@@ -123,7 +124,7 @@ class ConjugateGradients:
 
         by_blocks = LinearOperator(self.matrix.shape, self.precondition, dtype=float)
         x, failed = cg(self.matrix, b, rtol=ACCURACY, atol=0, maxiter=MOST_STEPS, M=by_blocks)
-        if failed:
+        if failed and np.isfinite(b).all():  # of what is not finite Gauss-Newton makes an end
             left = np.linalg.norm(b - self.matrix @ x) / np.linalg.norm(b)
             raise CorrelationError(
                 f"after {MOST_STEPS} steps of conjugate gradients {left:.1e} of the right-hand side of "
