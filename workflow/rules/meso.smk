@@ -23,7 +23,7 @@ rule start:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1500, 30.0),
+        mem_mb=memory(1500, 4.0),
         runtime=60,
     params:
         code=code("meso/start.py"),
@@ -147,7 +147,7 @@ rule meso_ultimate_error:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1500, 30.0),
+        mem_mb=memory(1500, 2 * VOXELS),
         runtime=60,
     params:
         code=code("meso/ultimate_error.py"),
