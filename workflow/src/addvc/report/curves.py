@@ -172,6 +172,7 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter("{x:g}")
+    ax.tick_params(axis="x", which="both", length=3)
     fig.legend(loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 
