@@ -117,8 +117,8 @@ def noise_of(levels: dict, far: float | None) -> dict:
     if noise >= least:
         return {"noise": noise, "noise_from": origin}
     log.warning(
-        "WARNING: the void is flat (noise %.2g grey levels): was the scan denoised or segmented? %.1f %% "
-        "of the contrast, %.2g, is taken for its noise; give the scans as they were reconstructed",
+        "WARNING: the void is flat (noise %.2g grey levels): was the scan denoised or segmented? %.1f "
+        "%% of the contrast, %.2g, is taken for its noise; give the scans as they were reconstructed",
         noise,
         100 * FLAT,
         least,
