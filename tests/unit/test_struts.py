@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from addvc.analysis.centre_line import Curve, centre_line
+from addvc.geometry.centre_line import Curve, centre_line
 from addvc.analysis.strut_energy import KINDS, strut_energy
 from addvc.analysis.strut_motion import Beam, frames, integrated, strut_motion
 from addvc.analysis.strut_prior import posterior, prior_variances, spread
