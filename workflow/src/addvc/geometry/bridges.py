@@ -99,7 +99,7 @@ def anchored(graph: StrutGraph, solid: np.ndarray) -> np.ndarray:
 def lasting(graph: StrutGraph, fixed: np.ndarray, held: np.ndarray) -> np.ndarray:
     """Which of the branches (b,) `held` are left when those that end at a junction where nothing else
     does are dropped, one after the other; `fixed` (j,): junctions that hold by themselves."""
-    ends = np.array([branch.ends for branch in graph.branches]).reshape(-1, 2)
+    ends = np.array([branch.ends for branch in graph.branches], dtype=int).reshape(-1, 2)
     while True:
         met = ends[held]
         degree = np.bincount(met[met != FREE_END], minlength=len(fixed))
@@ -148,9 +148,7 @@ def bridge(struts: GreyStruts, gap: Gap, least: float) -> Bridge:
     inner = np.clip(s, curve.middle - curve.half, curve.middle + curve.half)
     area = sections_of(curve, inner, struts.solid.voxels[own], struts.solid.share[own])
     points = path(struts, gap.branch, curve, s, length)
-    return Bridge(
-        points, np.maximum(np.sqrt(area / np.pi), least), gap.stop - gap.start, gap.absent
-    )
+    return Bridge(points, np.maximum(np.sqrt(area / np.pi), least), gap.stop - gap.start)
 
 
 def path(struts: GreyStruts, number: int, curve: Curve, s: np.ndarray, length: float) -> np.ndarray:
