@@ -53,7 +53,9 @@ rule solid:
         smooth=f"{R}/volumes/smooth0.h5",
         specimen=f"{R}/geometry/specimen.json",
         threshold=f"{R}/geometry/threshold.json",
-        reference=f"{R}/volumes/volume0.h5" if config["mesh"]["mend"] == "bridge" else [],
+        reference=(
+            f"{R}/volumes/volume0.h5" if config["mesh"]["mend"] == "bridge" else []
+        ),
     output:
         solid=f"{R}/geometry/solid.h5",
         region=f"{R}/geometry/region.json",
