@@ -14,16 +14,12 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
-from addvc.analysis.struts import section_areas
 from addvc.fem.frame import Frame
-from addvc.geometry.lines import nearest_line, resampled
-from addvc.geometry.region import Region, caps_depth
-from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph, strut_graph
+from addvc.geometry.centre_line import Curve
+from addvc.geometry.region import Region
+from addvc.geometry.sections import CUT, Solid, cut_depth, grey_struts, sections_of
+from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
 from addvc.images.files import atomic_path
-
-LOWER = 0.8
-"""Of the threshold for the porosity, above the void: where no strut is lost yet and none is made up."""
 
 PIECE = 2.6
 """Target length of a piece, voxels."""
@@ -31,23 +27,11 @@ PIECE = 2.6
 SHORTEST = 0.8
 """A piece from the end of a line to its junction, at least, voxels."""
 
-TRIMMED = 0.3
-"""Most of a strut that a junction takes at each end, where the balls of both would leave nothing."""
-
 ASTRAY = 1.5
 """How far from the skeleton's a junction may be put, voxels."""
 
 DOUBT = 0.1
 """Weight of the skeleton's junction against the line of one strut."""
-
-LEAST_AREA = 0.3
-"""Of a section, voxel^2."""
-
-HALO = 2
-"""Voxels around the solid that hold grey level of it."""
-
-CUT = 1.0
-"""Depth below the surface of the region, voxels, where struts are cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,63 +44,15 @@ class StrutFrame:
     span: float
 
 
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """Voxels (q, 3) in and near the solid with their share (q,) of solid, and the grey level
-    (nx, ny, nz) above that of the void."""
-
-    voxels: np.ndarray
-    share: np.ndarray
-    excess: np.ndarray
-
-
 def strut_frame(excess: np.ndarray, kept: np.ndarray, limit: float, region: Region) -> StrutFrame:
     """The frame of the solid of grey level excess (nx, ny, nz) above the void; `limit`: the threshold
     for the porosity above the void, kept (nx, ny, nz): what it keeps; all within the region."""
-    inside = within(region, excess.shape)
-    mask = largest(inside & (excess > LOWER * limit))
-    graph = strut_graph(mask)
-    if not graph.branches:
+    found = grey_struts(excess, kept, limit, region)
+    if not found.graph.branches:
         return StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
                           np.zeros(0, bool), 0.0)  # fmt: skip
-    near = ndimage.binary_dilation(mask, iterations=HALO) & inside
-    contrast = excess[near].sum() / (kept & inside).sum()
-    solid = Solid(np.argwhere(near).astype(float), excess[near] / contrast, excess * inside)
-    lines = [resampled(branch.points) for branch in graph.branches]
-    owned = nearest_line(lines, solid.voxels)
-    curves = [
-        strut_curve(branch, line, solid.share[own].sum(), graph.radii, solid.excess)
-        for branch, line, own in zip(graph.branches, lines, owned, strict=True)
-    ]
-    frame, span = assembled(graph, curves, owned, solid)
-    return StrutFrame(frame, loaded(frame.points, mask, region), span)
-
-
-def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
-    """(nx, ny, nz) bool: voxels of an image that are in the region."""
-    grid = np.moveaxis(np.indices(shape, dtype=np.float32), 0, -1)
-    ends, sides = caps_depth(region, grid)
-    return (ends > 0) & (sides > 0)
-
-
-def largest(mask: np.ndarray) -> np.ndarray:
-    """The largest component (nx, ny, nz), of 26 neighbours."""
-    label, _ = ndimage.label(mask, np.ones((3, 3, 3)))
-    count = np.bincount(label.ravel(), minlength=2)
-    count[0] = 0
-    return (label == count.argmax()) & mask
-
-
-def strut_curve(
-    branch: Branch, line: np.ndarray, volume: float, radii: np.ndarray, excess: np.ndarray
-) -> Curve:
-    """The centre line of a strut of this volume between the balls of its junctions, of radii (j,)."""
-    length = arc_length(line)[-1]
-    radius = np.sqrt(max(volume, LEAST_AREA) / (np.pi * length))
-    trims = np.array([0.0 if end == FREE_END else radii[end] for end in branch.ends])
-    if length - trims.sum() < 2 * radius:
-        trims = np.minimum(trims, TRIMMED * length)
-    return centre_line(line, (trims[0], length - trims[1]), radius, excess)
+    frame, span = assembled(found.graph, found.curves, found.owned, found.solid)
+    return StrutFrame(frame, loaded(frame.points, found.mask, region), span)
 
 
 def crossings(graph: StrutGraph, curves: list[Curve]) -> np.ndarray:
@@ -169,16 +105,6 @@ def stations(branch: Branch, curve: Curve, junctions: np.ndarray) -> np.ndarray:
     return s[near[0] : len(s) - near[1]]
 
 
-def sections_of(
-    curve: Curve, stations: np.ndarray, voxels: np.ndarray, share: np.ndarray
-) -> np.ndarray:
-    """Areas (g,) at arc lengths (g,) of a curve from the shares (q,) of solid of its voxels (q, 3)."""
-    line = curve(np.linspace(curve.middle - curve.half, curve.middle + curve.half, len(voxels) + 2))
-    s = curve.projected(voxels, curve.middle - curve.half + along(line, voxels))
-    radius = np.sqrt(max(share.sum(), LEAST_AREA) / (2 * curve.half * np.pi))
-    return np.maximum(section_areas(stations, s, share, max(radius / 2, 0.5)), LEAST_AREA)
-
-
 def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
     """Which nodes (n,) may be loaded from outside: those at a cut, and the nearest to each patch of the
     solid (nx, ny, nz) there, where a strut goes on that may be too short here to have nodes."""
@@ -189,12 +115,6 @@ def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
         patches = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
         out[cKDTree(points).query(patches)[1]] = True
     return out
-
-
-def cut_depth(region: Region, points: np.ndarray) -> np.ndarray:
-    """Depth (...) of points (..., 3) below the surfaces of the region that cut through the solid."""
-    caps, sides = caps_depth(region, points)
-    return np.minimum(caps, sides) if region.cut_sides else caps
 
 
 def save_frame(path: str | Path, held: StrutFrame) -> None:
