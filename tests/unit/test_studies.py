@@ -48,7 +48,7 @@ def test_lengths_are_those_of_the_paper_s_method_others_those_of_the_default_one
     [
         ("l_k", 2, "factor", "start"),
         ("threshold", 0.8, "threshold", None),
-        ("size", 1.5, "mesh", "surface"),
+        ("size", 1.5, "solid", "threshold"),
         ("size", 1, "factor", "start"),
     ],
 )

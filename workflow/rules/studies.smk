@@ -33,13 +33,19 @@ if STATES:
             smooth=f"{R}/volumes/smooth0.h5",
             specimen=f"{R}/geometry/specimen.json",
             threshold=given("threshold"),
+            reference=rules.solid.input.reference,
         output:
             solid=temp(own("solid")),
             region=own("region"),
+            bridges=own("bridges"),
         log:
             f"{V_LOGS}/solid.log",
         benchmark:
             f"{V_TIMES}/solid.tsv"
+        params:
+            mesh=lambda wildcards: variant_of(wildcards).mesh(
+                section("mesh", "min_kept", "mend", "size")
+            ),
 
     use rule surface as variant_surface with:
         input:

@@ -28,6 +28,7 @@ FILES = {
     "threshold": "geometry/threshold.json",
     "solid": "geometry/solid.h5",
     "region": "geometry/region.json",
+    "bridges": "geometry/bridges.json",
     "surface": "geometry/surface.vtu",
     "mesh": "geometry/micro_mesh.vtu",
     "figures": "geometry/micro.json",
@@ -50,8 +51,9 @@ MAIN = {
 }
 """Files of the main run for one of its results."""
 
-FIRST = {"threshold": "threshold", "size": "mesh"}
-"""The first of FILES that a parameter touches; others touch the factor only."""
+FIRST = {"threshold": "threshold", "size": "solid"}
+"""The first of FILES that a parameter touches (bridges are as thick as the lattice needs them); others
+touch the factor only."""
 
 
 @dataclass(frozen=True)
