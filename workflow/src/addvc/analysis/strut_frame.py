@@ -1,10 +1,9 @@
 """The whole foam as a frame of beams, thin struts included, from the grey level of the reference.
 
 The mesh of micro DVC holds what the threshold for the porosity keeps; it loses thin struts, which
-carry load all the same. A lower threshold keeps the network whole: its skeleton gives the struts,
-the centroids of the grey level their lines, the grey level per length their sections. The threshold
-is that of the blurred image, in which noise stays below it; centroids and sums of the grey level
-bear noise and are those of the image itself. A junction is the point nearest to the lines of its
+carry load all the same. A lower threshold keeps the network whole (`frame_mask`): its skeleton gives
+the struts, the centroids of the grey level their lines, the grey level per length their sections;
+both bear noise and are of the image as scanned. A junction is the point nearest to the lines of its
 struts, continued straight on.
 """
 
@@ -17,15 +16,13 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
+from addvc.analysis.frame_mask import solid_mask, within
 from addvc.analysis.struts import section_areas
 from addvc.fem.frame import Frame
 from addvc.geometry.lines import nearest_line, resampled
 from addvc.geometry.region import Region, caps_depth
 from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph, strut_graph
 from addvc.images.files import atomic_path
-
-LOWER = 0.8
-"""Of the threshold for the porosity, above the void: where no strut is lost yet and none is made up."""
 
 PIECE, PIECE_RADII = 2.6, 1.2
 """Target length of a piece: voxels, and radii of its strut where these are more."""
@@ -79,13 +76,13 @@ def strut_frame(
     """The frame of the solid within the region, of grey levels (nx, ny, nz) above that of the void:
     excess as scanned, blurred as the threshold for the porosity is of, which is `limit` above it."""
     inside = within(region, excess.shape)
-    mask = largest(inside & (blurred > LOWER * limit))
+    mask = solid_mask(excess, blurred, limit, inside)
     graph = strut_graph(mask)
     if not graph.branches:
         return StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
                           np.zeros(0, bool), 0.0)  # fmt: skip
     near = ndimage.binary_dilation(mask, iterations=HALO) & inside
-    contrast = excess[near].sum() / (mask & (blurred > limit)).sum()
+    contrast = excess[near].sum() / max((mask & (blurred > limit)).sum(), 1)
     solid = Solid(np.argwhere(near).astype(float), excess[near] / contrast, excess * inside)
     lines = [resampled(branch.points) for branch in graph.branches]
     owned = nearest_line(lines, solid.voxels)
@@ -95,21 +92,6 @@ def strut_frame(
     ]
     frame, span = assembled(graph, curves, owned, solid)
     return StrutFrame(frame, loaded(frame.points, mask, region), span)
-
-
-def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
-    """(nx, ny, nz) bool: voxels of an image that are in the region."""
-    grid = np.moveaxis(np.indices(shape, dtype=np.float32), 0, -1)
-    ends, sides = caps_depth(region, grid)
-    return (ends > 0) & (sides > 0)
-
-
-def largest(mask: np.ndarray) -> np.ndarray:
-    """The largest component (nx, ny, nz), of 26 neighbours."""
-    label, _ = ndimage.label(mask, np.ones((3, 3, 3)))
-    count = np.bincount(label.ravel(), minlength=2)
-    count[0] = 0
-    return (label == count.argmax()) & mask
 
 
 def strut_curve(
