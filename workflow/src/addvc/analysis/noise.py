@@ -1,9 +1,9 @@
 """The standard uncertainty of each node from the noise of the images, and whether errors obey it.
 
-Draws of noise are solved at rest, with the l_E of the state (`correlation/uncertainty.py`). Where the frame of a
-method turns with the struts by R, which is smooth, its system is R A R^T, and its right-hand side for
-the same noise R b: a draw turns with its strut, R u. Its length, and its parts along the strut and
-normal to it, stay those at rest.
+Draws of noise are solved at rest, with the l_E of the state (`correlation/uncertainty.py`). Where the
+frame of a method turns with the struts by R, which is smooth, its system is R A R^T, and its
+right-hand side for the same noise R b: a draw turns with its strut, R u. Its length, and its parts
+along the strut and normal to it, stay those at rest.
 
 What is not in it: robust weights, struts that were mended or lost, and what a method cannot follow
 because of its regularisation.

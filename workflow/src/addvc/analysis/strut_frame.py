@@ -170,7 +170,7 @@ def linked(branch: Branch, inner: np.ndarray) -> np.ndarray:
 
 
 def middles(branch: Branch, s: np.ndarray) -> np.ndarray:
-    """Arc lengths (m,) of the pieces between nodes at s (g,); of those to junctions, where they start."""
+    """Arc lengths (m,) of the pieces between nodes at s (g,); of those to junctions, their nodes."""
     first, second = (int(end != FREE_END) for end in branch.ends)
     return np.concatenate([s[:first], (s[1:] + s[:-1]) / 2, s[len(s) - second :]])
 

@@ -232,18 +232,27 @@ def quality(summary: dict) -> str:
     return text + (known if errors else "")
 
 
+def balance_words(summary: dict) -> str:
+    """In which states struts were measured in equilibrium."""
+    states = [(s["label"], (s.get("equilibrium") or {}).get("weight")) for s in summary["states"]]
+    taken = [label for label, weight in states if weight is not None]
+    if not taken:
+        return "Struts were measured on the displacement as it is, without equilibrium of them. "
+    where = "in every state" if len(taken) == len(states) else f"at {listing(taken)} only"
+    return (
+        "Noise that no frame of elastic struts in equilibrium could follow was taken off the "
+        f"displacement {where}, with the weight of the equilibrium by generalised cross-validation "
+        "{validation}; it is left as measured where Stein's estimate {stein} has the error grow even if "
+        "noise were twice what is expected. "
+    )
+
+
 def struts(summary: dict, config: dict) -> str:
     """How struts and cells were analysed, and what came out."""
     found = [s["struts"] for s in summary["states"] if (s["struts"] or {}).get("bending_share")]
     if not found:
         return ""
-    text = (
-        "Noise that no frame of elastic struts in equilibrium could follow was taken off the "
-        "displacement, with the weight of the equilibrium by generalised cross-validation "
-        "{validation}, unless that would add to the error by Stein's estimate {stein}. "
-        if config["struts"]["equilibrium"]
-        else ""
-    )
+    text = balance_words(summary) if config["struts"]["equilibrium"] else ""
     text += (
         "The motion of each strut was fitted by that of a geometrically exact beam; the energy of the "
         f"{span([one['valid'] for one in found], 'd')} valid struts is in bending {{bending}} by "
