@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from addvc.analysis import frame_filter
 from addvc.analysis.balance import REFUSALS, balanced, micro_fields, refusal
 from addvc.analysis.carried import Attached, first_motion
-from addvc.analysis.centre_line import Curve
 from addvc.analysis.frame_filter import WEIGHTS, Problem, best_fit, fitted, judged, mean_square
 from addvc.analysis.strut_frame import (
     SHORTEST,
@@ -26,6 +25,7 @@ from addvc.analysis.strut_frame import (
 )
 from addvc.analysis.strut_table import RAW, Measured
 from addvc.fem.frame import Frame, FrameMotion, at_rest, energies, forces, moduli, skew, strains
+from addvc.geometry.centre_line import Curve
 from addvc.geometry.region import Region
 from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
 

@@ -35,7 +35,7 @@ from addvc.geometry.surface import (
     remeshed,
 )
 from addvc.geometry.tets import TetOptions, largest_piece, tetrahedralise
-from addvc.geometry.threshold import bisect_threshold, check_contrast
+from addvc.geometry.threshold import FLAT, bisect_threshold, check_contrast, noise_of
 from addvc.images.specimen import Specimen
 
 SHELL_PEAK = 7.7253 / (2 * np.pi)  # second maximum of sin(2 pi r) / (2 pi r), in wavelengths
@@ -370,3 +370,10 @@ def test_grid_reaches_into_the_platens_it_can_see():
     assert_allclose(lines[1], [0, *np.linspace(5.3, 44.8, 5), 49])
     none = Specimen("cylinder", 1, -0.5, 49.5, (20.0, 22.5), radius=15.0)
     assert_allclose(grid_lines(shape, none, 3, 4, 10.0)[1], np.linspace(0, 49, 5))
+
+
+def test_a_flat_void_has_the_noise_of_a_share_of_the_contrast():
+    levels = {"void": 20.0, "solid": 120.0, "noise": 0.0}
+    assert noise_of(levels, None)["noise"] == noise_of(levels, 1e-9)["noise"] == 100 * FLAT
+    assert noise_of(levels | {"noise": 3.0}, None)["noise"] == 3.0
+    assert noise_of(levels, 2.0) == {"noise": 2.0, "noise_from": "void 3 voxels off the solid"}

@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from addvc.analysis.centre_line import Curve, centre_line
 from addvc.analysis.strut_energy import KINDS, strut_energy
 from addvc.analysis.strut_motion import Beam, frames, integrated, strut_motion
 from addvc.analysis.strut_prior import posterior, prior_variances, spread
@@ -34,6 +33,7 @@ from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.store import save_solution
 from addvc.fem.io import write_vtu
 from addvc.fem.mesh import Mesh, cell_volumes
+from addvc.geometry.centre_line import Curve, centre_line
 from addvc.geometry.skeleton import FREE_END, Branch, kinks, simplified, strut_graph
 from addvc.images.files import write_json
 from addvc.report.case import Case

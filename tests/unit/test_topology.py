@@ -155,13 +155,14 @@ def test_turning_stretches_nothing_and_pulling_by_a_tenth_a_tenth(crossed):
 def test_all_of_it_as_a_table_and_a_picture(frame, tmp_path):
     mesh, graph, cut, grey = frame
     struts = partition(mesh, graph, grey)
-    found = topology(mesh, cut, graph, struts, [])
-    assert found["counts"] == {"stubs": 1, "necks": 0, "contacts": 0, "welds": 0}
+    bridges = [{"position": [9.0, 8, 7], "length": 3.0, "radius": 1.0}]
+    found = topology(mesh, cut, graph, struts, [], bridges)
+    assert found["counts"] == {"stubs": 1, "necks": 0, "contacts": 0, "welds": 0, "bridges": 1}
     write_json(tmp_path / "geometry/topology.json", found)
     case = Case.of({"root": tmp_path, "labels": {}, "meso": ["meso9"], "micro": ["micro"]})
     write_table(tmp_path / "t.csv", pictures.topology_rows(case))
     rows = list(csv.reader((tmp_path / "t.csv").open()))
-    assert [row[0] for row in rows] == ["Kind", "stub"]
+    assert [row[0] for row in rows] == ["Kind", "stub", "bridge"]
     assert len(pictures.places(found)["stubs"]) == 1
     layer = pictures.ball(np.array([[1.0, 2, 3], [9, 9, 9]]), "#ff0000")
     assert layer.points.mean(axis=0) == pytest.approx([5, 5.5, 6], abs=1e-6)

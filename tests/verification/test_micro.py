@@ -5,9 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from addvc.correlation.corotational import Mending, Problem, Stage, corotational
+from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import doubtful_nodes, without
 from addvc.correlation.micro import elastic, mending, micro_options, micro_reference, stages
 from addvc.correlation.register import Stop
+from addvc.correlation.uncertainty import Noise
 from verification.frame import CENTRE, CORNERS, SECTION, SHAPE, image, rms_error
 
 LAST = Stop(1e-4, 40)
@@ -106,6 +108,18 @@ def test_a_strut_that_went_astray_is_mended(problem):
     assert rms_error(found.u, truth) < 0.06
     assert found.converged
     assert [row["stage"] for row in notes["stages"]][1:3] == ["carried", "carried"]
+
+
+def test_two_stages_choose_a_length_and_mend(problem):
+    forth, back = turned_by(20)
+    points = problem.reference.mesh.points
+    truth, deformed = forth(points), image(back, 31)
+    plan = [Stage(True, 15.0, Stop(1e-2, 10)), Stage(True, 15.0, LAST)]
+    ladder = Ladder(Noise(1.5, 0.0), shortest=0, longest=1)
+    mend = Mending(3, 4.0, most=0.5)
+    found, notes = corotational(problem, deformed, off_course(points, truth), plan, mend, ladder)
+    assert notes["risk"] and "carried" in [row["stage"] for row in notes["stages"]]
+    assert rms_error(found.u, truth) < 0.06
 
 
 def test_no_stage_of_mending_is_longer_than_the_last_may_be(problem):

@@ -289,6 +289,7 @@ rule strut_partition:
 rule topology:
     input:
         solid=f"{R}/geometry/solid.h5",
+        bridges=f"{R}/geometry/bridges.json",
         threshold=f"{R}/geometry/threshold.json",
         mesh=f"{R}/geometry/micro.vtu",
         struts=f"{R}/geometry/struts.h5",

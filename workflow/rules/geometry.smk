@@ -53,9 +53,13 @@ rule solid:
         smooth=f"{R}/volumes/smooth0.h5",
         specimen=f"{R}/geometry/specimen.json",
         threshold=f"{R}/geometry/threshold.json",
+        reference=(
+            f"{R}/volumes/volume0.h5" if config["mesh"]["mend"] == "bridge" else []
+        ),
     output:
         solid=f"{R}/geometry/solid.h5",
         region=f"{R}/geometry/region.json",
+        bridges=f"{R}/geometry/bridges.json",
     log:
         f"{R}/logs/solid/all.log",
     benchmark:
@@ -69,7 +73,7 @@ rule solid:
     params:
         code=code("geometry/solid.py"),
         micro=section("micro", "region"),
-        mesh=section("mesh", "min_kept"),
+        mesh=section("mesh", "min_kept", "mend", "size"),
     script:
         "../scripts/geometry/solid.py"
 

@@ -22,6 +22,7 @@ with job(snakemake) as log:
         )
     ]
     cut = classes["surface"].ravel() > 0
-    found = topology(Mesh(points, cells), cut, strut_graph(solid), struts, states)
+    mesh, bridges = Mesh(points, cells), read_json(source.bridges)
+    found = topology(mesh, cut, strut_graph(solid), struts, states, bridges)
     log.info("%s", found["counts"])
     write_json(snakemake.output[0], found)

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 
+from addvc.geometry.bridges import bridged
 from addvc.geometry.region import micro_region
 from addvc.geometry.surface import region_solid
 from addvc.images.files import read_json, write_json
@@ -14,6 +15,11 @@ with job(snakemake):
     specimen = Specimen.from_dict(read_json(snakemake.input.specimen))
     region = micro_region(specimen, snakemake.params.micro["region"])
     levels = read_json(snakemake.input.threshold)
-    grey, figures = region_solid(smooth, levels, region, snakemake.params.mesh["min_kept"])
+    mesh, bridges = snakemake.params.mesh, []
+    if mesh["mend"] == "bridge":
+        reference, _ = load_volume(snakemake.input.reference)
+        smooth, bridges = bridged(smooth, reference, levels, region, mesh["size"])
+    grey, figures = region_solid(smooth, levels, region, mesh["min_kept"])
     save_volume(snakemake.output.solid, grey, notes["voxel_size_um"], figures)
     write_json(snakemake.output.region, asdict(region))
+    write_json(snakemake.output.bridges, bridges)

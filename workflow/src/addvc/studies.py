@@ -87,7 +87,7 @@ class Variant:
 
     def section(self, micro: dict) -> dict:
         """The `micro` section under this change; lengths may be "auto", hence `times`."""
-        if self.parameter in LENGTHS:
+        if self.parameter in LENGTHS and self.factor != 1:
             return micro | {"times": {self.parameter: self.factor}}
         return micro | {"nu": micro["nu"] * self.factor} if self.parameter == "nu" else micro
 

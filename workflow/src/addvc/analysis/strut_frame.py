@@ -1,10 +1,8 @@
 """The whole foam as a frame of beams, thin struts included, from the grey level of the reference.
 
 The mesh of micro DVC holds what the threshold for the porosity keeps; it loses thin struts, which
-carry load all the same. A lower threshold keeps the network whole (`frame_mask`): its skeleton gives
-the struts, the centroids of the grey level their lines, the grey level per length their sections;
-both bear noise and are of the image as scanned. A junction is the point nearest to the lines of its
-struts, continued straight on.
+carry load all the same. A lower threshold keeps the network whole (`geometry.sections`). A junction is
+the point nearest to the lines of its struts, continued straight on.
 """
 
 from dataclasses import dataclass
@@ -15,13 +13,11 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
-from addvc.analysis.frame_mask import solid_mask, within
-from addvc.analysis.struts import section_areas
 from addvc.fem.frame import Frame
-from addvc.geometry.lines import nearest_line, resampled
-from addvc.geometry.region import Region, caps_depth
-from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph, strut_graph
+from addvc.geometry.centre_line import Curve
+from addvc.geometry.region import Region
+from addvc.geometry.sections import CUT, Solid, cut_depth, grey_struts, mean_radius, sections_of
+from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
 from addvc.images.files import atomic_path
 
 PIECE, PIECE_RADII = 2.6, 1.2
@@ -30,24 +26,12 @@ PIECE, PIECE_RADII = 2.6, 1.2
 SHORTEST = 0.8
 """A piece, at least, voxels: its stiffness goes with one over its length."""
 
-TRIMMED = 0.3
-"""Most of a strut that a junction takes at each end, where the balls of both would leave nothing."""
-
 ASTRAY, ASTRAY_RADII = 1.5, 0.6
 """How far from the skeleton's a junction may be put: voxels, and radii of its ball where these are
 more."""
 
 DOUBT = 0.1
 """Weight of the skeleton's junction against the line of one strut."""
-
-LEAST_AREA = 0.3
-"""Of a section, voxel^2."""
-
-HALO = 2
-"""Voxels around the solid that hold grey level of it."""
-
-CUT = 1.0
-"""Depth below the surface of the region, voxels, where struts are cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,55 +44,17 @@ class StrutFrame:
     span: float
 
 
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """Voxels (q, 3) in and near the solid with their share (q,) of solid, and the grey level
-    (nx, ny, nz) above that of the void."""
-
-    voxels: np.ndarray
-    share: np.ndarray
-    excess: np.ndarray
-
-
 def strut_frame(
     excess: np.ndarray, blurred: np.ndarray, limit: float, region: Region
 ) -> StrutFrame:
     """The frame of the solid within the region, of grey levels (nx, ny, nz) above that of the void:
     excess as scanned, blurred as the threshold for the porosity is of, which is `limit` above it."""
-    inside = within(region, excess.shape)
-    mask = solid_mask(excess, blurred, limit, inside)
-    graph = strut_graph(mask)
-    if not graph.branches:
+    found = grey_struts(excess, blurred, limit, region)
+    if not found.graph.branches:
         return StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
                           np.zeros(0, bool), 0.0)  # fmt: skip
-    near = ndimage.binary_dilation(mask, iterations=HALO) & inside
-    contrast = excess[near].sum() / max((mask & (blurred > limit)).sum(), 1)
-    solid = Solid(np.argwhere(near).astype(float), excess[near] / contrast, excess * inside)
-    lines = [resampled(branch.points) for branch in graph.branches]
-    owned = nearest_line(lines, solid.voxels)
-    curves = [
-        strut_curve(branch, line, solid.share[own].sum(), graph.radii, solid.excess)
-        for branch, line, own in zip(graph.branches, lines, owned, strict=True)
-    ]
-    frame, span = assembled(graph, curves, owned, solid)
-    return StrutFrame(frame, loaded(frame.points, mask, region), span)
-
-
-def strut_curve(
-    branch: Branch, line: np.ndarray, volume: float, radii: np.ndarray, excess: np.ndarray
-) -> Curve:
-    """The centre line of a strut of this volume between the balls of its junctions, of radii (j,)."""
-    length = arc_length(line)[-1]
-    radius = mean_radius(volume, length)
-    trims = np.array([0.0 if end == FREE_END else radii[end] for end in branch.ends])
-    if length - trims.sum() < 2 * radius:
-        trims = np.minimum(trims, TRIMMED * length)
-    return centre_line(line, (trims[0], length - trims[1]), radius, excess)
-
-
-def mean_radius(volume: float, length: float) -> float:
-    """Of a round strut, voxels."""
-    return float(np.sqrt(max(volume, LEAST_AREA) / (np.pi * length)))
+    frame, span = assembled(found.graph, found.curves, found.owned, found.solid)
+    return StrutFrame(frame, loaded(frame.points, found.mask, region), span)
 
 
 def crossings(graph: StrutGraph, curves: list[Curve]) -> np.ndarray:
@@ -187,16 +133,6 @@ def stations(branch: Branch, curve: Curve, junctions: np.ndarray, piece: float) 
     return s[kept]
 
 
-def sections_of(
-    curve: Curve, stations: np.ndarray, voxels: np.ndarray, share: np.ndarray
-) -> np.ndarray:
-    """Areas (g,) at arc lengths (g,) of a curve from the shares (q,) of solid of its voxels (q, 3)."""
-    line = curve(np.linspace(curve.middle - curve.half, curve.middle + curve.half, len(voxels) + 2))
-    s = curve.projected(voxels, curve.middle - curve.half + along(line, voxels))
-    radius = mean_radius(share.sum(), 2 * curve.half)
-    return np.maximum(section_areas(stations, s, share, max(radius / 2, 0.5)), LEAST_AREA)
-
-
 def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
     """Which nodes (n,) may be loaded from outside: those at a cut, and the nearest to each patch of the
     solid (nx, ny, nz) there, where a strut goes on that may be too short here to have nodes."""
@@ -207,12 +143,6 @@ def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:
         patches = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
         out[cKDTree(points).query(patches)[1]] = True
     return out
-
-
-def cut_depth(region: Region, points: np.ndarray) -> np.ndarray:
-    """Depth (...) of points (..., 3) below the surfaces of the region that cut through the solid."""
-    caps, sides = caps_depth(region, points)
-    return np.minimum(caps, sides) if region.cut_sides else caps
 
 
 def save_frame(path: str | Path, held: StrutFrame) -> None:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from addvc.analysis.centre_line import Curve, along, arc_length, centre_line
 from addvc.fem.mesh import Mesh, cell_volumes, nodal_volumes
+from addvc.geometry.centre_line import Curve, along, arc_length, centre_line
 from addvc.geometry.lines import nearest_line, resampled
+from addvc.geometry.sections import section_areas
 from addvc.geometry.skeleton import FREE_END, StrutGraph
 
 STATIONS = 17
@@ -120,12 +121,3 @@ def measured_strut(
     place = np.interp(of_node[inside], dense, arc / arc[-1] * (STATIONS - 1))
     return Strut(ends, curve(stations), area, float(arc[-1]), float(arc[-1] + sum(trims)),
                  skin.number[inside], skin.weight[inside], place)  # fmt: skip
-
-
-def section_areas(
-    stations: np.ndarray, s: np.ndarray, volume: np.ndarray, width: float
-) -> np.ndarray:
-    """Area (g,) of the sections at arc lengths (g,): volumes (q,) at arc lengths (q,) per length, by
-    a Gaussian window."""
-    window = np.exp(-0.5 * ((stations[:, None] - s) / width) ** 2)
-    return window @ volume / (np.sqrt(2 * np.pi) * width)

@@ -130,13 +130,20 @@ def over_all(stretched: np.ndarray, groups: Sequence[np.ndarray]) -> list[float]
 
 
 def topology(
-    mesh: Mesh, cut: np.ndarray, graph: StrutGraph, struts: Sequence[Strut], states: Sequence[Moved]
+    mesh: Mesh,
+    cut: np.ndarray,
+    graph: StrutGraph,
+    struts: Sequence[Strut],
+    states: Sequence[Moved],
+    bridges: Sequence[dict] = (),
 ) -> dict:
-    """Lists of stubs, necks and contacts (welds among them), and their counts."""
+    """Lists of stubs, necks and contacts (welds among them) with their counts; and the bridges that the
+    mesh was made with."""
     found = {
         "stubs": dangling_stubs(graph, mesh, cut),
         "necks": necks(struts),
         "contacts": welds(mesh, graph, states),
+        "bridges": list(bridges),
     }
     counts = {name: len(rows) for name, rows in found.items()}
     return {"counts": counts | {"welds": sum(c["weld"] for c in found["contacts"])}} | found

@@ -13,8 +13,8 @@ noise in the void may be its texture, which moves with the solid (trabecular bon
 where the residual had 1.1 in all). So draws are scaled down until they leave no more than there is
 in the residual of u.
 
-The search goes down a ladder of l_E from a converged u: for each rung one linear step, with
-conjugate gradients preconditioned by the factor at hand.
+The search climbs a ladder of l_E, then goes down it, as long as the risk falls: for each rung one
+linear step from a u that a stage has found, with conjugate gradients preconditioned by its factor.
 
 On the default twin, rms error in voxels with l_E = 0.8 cell size in all states and with the one
 chosen: .088 / .071, .092 / .080, .109 / .107 at 3.4, 5.2, 12.3 % (l_E of 52, 52 and 35 voxels); where
@@ -57,10 +57,10 @@ class Ladder:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A converged u (n, 3) of a system, what the images pull it to, and draws of noise (d, 3 n).
+    """A u (n, 3) of a system, what the images pull it to, and draws of noise (d, 3 n).
 
-    `pull` b (3 n,) and `forces` M u + f (3 n,) at u: they balance. `share`: of the variance of the
-    draws, what is noise."""
+    `pull` b (3 n,) and `forces` M u + f (3 n,) at u: they balance where u has converged. `share`: of the
+    variance of the draws, what is noise."""
 
     system: System
     deformed: np.ndarray

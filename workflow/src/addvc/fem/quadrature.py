@@ -1,7 +1,7 @@
 """Where a functional is evaluated: an element and its points. The same kernels serve every mesh.
 
-Micro meshes use Gauss points; meso meshes use the voxel centres inside each element, so that the
-voxels are shared out without overlap or gap; the hexahedral grid finds them by its lattice.
+Micro meshes use Gauss points; meso meshes one point of each voxel whose centre is inside an element, so
+that the voxels are shared out without overlap or gap; the hexahedral grid finds them by its lattice.
 """
 
 from dataclasses import dataclass

@@ -122,9 +122,11 @@ class ConjugateGradients:
         """x (N,) of A x = b (N,) to ACCURACY. Raises CorrelationError where MOST_STEPS do not do."""
         from scipy.sparse.linalg import LinearOperator, cg
 
+        if not np.isfinite(b).all():  # Gauss-Newton makes an end of it
+            return np.full(len(b), np.nan)
         by_blocks = LinearOperator(self.matrix.shape, self.precondition, dtype=float)
         x, failed = cg(self.matrix, b, rtol=ACCURACY, atol=0, maxiter=MOST_STEPS, M=by_blocks)
-        if failed and np.isfinite(b).all():  # of what is not finite Gauss-Newton makes an end
+        if failed:
             left = np.linalg.norm(b - self.matrix @ x) / np.linalg.norm(b)
             raise CorrelationError(
                 f"after {MOST_STEPS} steps of conjugate gradients {left:.1e} of the right-hand side of "

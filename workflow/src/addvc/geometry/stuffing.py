@@ -20,9 +20,10 @@ from scipy.spatial import cKDTree
 from addvc.fem.mesh import TET_EDGES, Mesh, oriented
 
 NEAR_LONG, NEAR_SHORT = 0.24, 0.40  # of the edge: a lattice point is moved onto a nearer cut
+NECK = 0.65  # of the spacing: the least radius of a strut
 
 
-def stuff(grey: np.ndarray, gamma: float, spacing: float, neck: float = 0.65) -> Mesh:
+def stuff(grey: np.ndarray, gamma: float, spacing: float, neck: float = NECK) -> Mesh:
     """Tetrahedra of {grey > gamma} for a volume (nx, ny, nz), lattice cubes of side `spacing`.
 
     The grey level between voxels is the cubic spline through them. A strut thinner than the

@@ -5,12 +5,18 @@ outline) whose blurred grey level is below gamma. The marching-cubes volume is s
 than that of the voxels for struts two voxels thick: the count of voxels is what is matched.
 """
 
+import logging
 from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
 
 from addvc.errors import GeometryError
+
+log = logging.getLogger(__name__)
+
+FLAT = 0.002
+"""Noise over the contrast of solid and void, at least; that of a good scan is some hundredths."""
 
 
 def bisect_threshold(
@@ -97,6 +103,24 @@ def find_threshold(smooth: np.ndarray, specimen, porosity: float, setting: str |
         "porosity": float(np.mean(grey < gamma)),
         "target": porosity,
         "trials": trials,
-        "noise": levels["noise"] if far is None else far,
-        "noise_from": "all void" if far is None else "void 3 voxels off the solid",
+        **noise_of(levels, far),
     }
+
+
+def noise_of(levels: dict, far: float | None) -> dict:
+    """The noise (grey levels) and where it is from: of the void `far` from any solid, of all void where
+    there is none such. Of a flat void FLAT of the contrast: no residual is below nothing."""
+    noise, origin = levels["noise"], "all void"
+    if far is not None:
+        noise, origin = far, "void 3 voxels off the solid"
+    least = FLAT * (levels["solid"] - levels["void"])
+    if noise >= least:
+        return {"noise": noise, "noise_from": origin}
+    log.warning(
+        "WARNING: the void is flat (noise %.2g grey levels): was the scan denoised or segmented? %.1f "
+        "%% of the contrast, %.2g, is taken for its noise; give the scans as they were reconstructed",
+        noise,
+        100 * FLAT,
+        least,
+    )
+    return {"noise": least, "noise_from": f"{FLAT:.1%} of the contrast: the void is flat"}

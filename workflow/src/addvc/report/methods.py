@@ -185,6 +185,8 @@ def chosen_words(method: str, section: dict) -> str:
 
 def endings(summary: dict, method: str) -> str:
     """In which states the loop of the default method ended."""
+    if not summary["states"]:
+        return "state by state"
     lost = [state["label"] for state in summary["states"] if not state["micro"]["converged"]]
     if lost:
         return f"which that of {method} did not at {listing(lost)}"

@@ -14,6 +14,7 @@ KINDS = {
     "necks": ("necks", style.ORANGE),
     "welds": ("welds", style.BLUE),
     "contacts": ("other contacts", "#7f7f7f"),
+    "bridges": ("bridges", style.SERIES[2]),
 }
 """What is marked: its name and its colour."""
 
@@ -31,6 +32,7 @@ def places(found: dict) -> dict[str, np.ndarray]:
         "necks": found["necks"],
         "welds": [c for c in found["contacts"] if c["weld"]],
         "contacts": [c for c in found["contacts"] if not c["weld"]],
+        "bridges": found["bridges"],
     }
     return {
         kind: np.array([row["position"] for row in rows]).reshape(-1, 3)
@@ -39,7 +41,7 @@ def places(found: dict) -> dict[str, np.ndarray]:
 
 
 def marked(case: Case, outputs: Iterable[str]) -> None:
-    """The mesh in grey from two sides, with a ball at each stub, neck, weld and other contact."""
+    """The mesh in grey from two sides, a ball at each stub, neck, weld, contact and bridge."""
     mesh, where = case.mesh("micro"), places(case.json("geometry/topology.json"))
     points, faces, _ = compact(mesh.points, boundary(mesh)[0])
     foam = Layer(points, faces, colour="#d5dae0", opacity=0.35)
@@ -54,6 +56,7 @@ def marked(case: Case, outputs: Iterable[str]) -> None:
     handles = [
         style.line(colour, f"{name}: {len(where[kind])}", "", "o")
         for kind, (name, colour) in KINDS.items()
+        if len(where[kind]) or kind != "bridges"
     ]
     fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     style.save(fig, outputs)
@@ -71,7 +74,7 @@ def ball(centres: np.ndarray, colour: str) -> Layer:
 
 
 def topology_rows(case: Case) -> list[list[str]]:
-    """A row for each stub, neck and contact: where, how large, and for contacts how far torn."""
+    """A row for each stub, neck, contact and bridge: where, how large, and for contacts how far torn."""
     found = case.json("geometry/topology.json")
     rows = [["Kind", "x (voxel)", "y (voxel)", "z (voxel)", "Size", "Unit", "Note"]]
     for stub in found["stubs"]:
@@ -89,6 +92,9 @@ def topology_rows(case: Case) -> list[list[str]]:
         note = "stretch over the mean before, after micro DVC: " + "; ".join(torn)
         kind = "weld" if contact["weld"] else "contact"
         rows.append(_row(kind, contact, str(contact["edges"]), "edges", note if torn else "–"))
+    for bridge in found["bridges"]:
+        note = f"put in by mesh.mend, mean radius {bridge['radius']:.2f} voxels"
+        rows.append(_row("bridge", bridge, f"{bridge['length']:.1f}", "voxel long", note))
     return rows
 
 

@@ -1,4 +1,4 @@
-"""The voxels of the solid that the frame of struts is the skeleton of: thin struts, but no noise.
+"""The voxels of solid that struts are found from: with the thin ones, but no noise.
 
 The threshold for the porosity is that of the blurred image. Blur takes the grey level of thin struts
 away, so the image as scanned, at a lower threshold, keeps most of them; but it has more noise. It is
@@ -11,7 +11,6 @@ import numpy as np
 from scipy import ndimage
 from scipy.stats import median_abs_deviation
 
-from addvc.geometry.region import Region, caps_depth
 from addvc.geometry.threshold import far_void
 
 log = logging.getLogger(__name__)
@@ -34,7 +33,7 @@ def solid_mask(
     sharp = SHARP * limit >= CLEAR * noise
     log.info(
         "the threshold is %.1f deviations of the noise as scanned above the void (at least %.1f): "
-        "the frame is that of the %s image",
+        "struts are those of the %s image",
         SHARP * limit / max(noise, 1e-12), CLEAR, "scanned" if sharp else "blurred",
     )  # fmt: skip
     return largest(inside & (excess > SHARP * limit if sharp else blurred > BLURRED * limit))
@@ -44,13 +43,6 @@ def void_deviation(excess: np.ndarray, void: np.ndarray) -> float:
     """Standard deviation of the grey level in the void, bool (nx, ny, nz), from its median; infinite
     where there is no void to tell it."""
     return float(median_abs_deviation(excess[void], scale="normal")) if void.any() else np.inf
-
-
-def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
-    """(nx, ny, nz) bool: voxels of an image that are in the region."""
-    grid = np.moveaxis(np.indices(shape, dtype=np.float32), 0, -1)
-    ends, sides = caps_depth(region, grid)
-    return (ends > 0) & (sides > 0)
 
 
 def largest(mask: np.ndarray) -> np.ndarray:
