@@ -9,7 +9,8 @@ from snakemake.utils import validate
 
 from addvc.images.hashes import content_hash
 from addvc.provenance import commit
-from addvc.report.methods import REFERENCES, STARTS, Citations, listing, methods, span
+from addvc.report.methods import STARTS, listing, methods, span
+from addvc.report.references import REFERENCES, Citations
 
 ROOT = Path(__file__).parents[2]
 MESH = {"nodes": 71416, "cells": 239573, "mean_edge": 12.34, "mean_volume": 0.117,

@@ -26,8 +26,8 @@ REFUSALS = {
     "clamped": "the frame has no node, of {frame_nodes}, that is free of loads from outside (at least "
     "1), so that nothing is in equilibrium; widen micro.region",
     "unseen": "{carrying:.0%} of the nodes of the frame carry valid nodes of the mesh, {nodes} in all "
-    f"(at least {CARRYING:.0%}, over {NEAR}), so that what was not measured would decide; see Fig. 13 "
-    "for where nodes are in doubt; lower mesh.size or geometry.threshold where the mesh lacks struts",
+    f"(at least {CARRYING:.0%}, over {NEAR}), so that the rest would decide; see Fig. 13 for "
+    "where nodes are in doubt; lower mesh.size, or set mesh.mend: bridge where the mesh lacks struts",
     "noiseless": "the draws of the noise are zero (over 0 voxel), so that nothing can be told from "
     "noise; this is right for images without noise only: of others, check geometry/threshold.json",
     "unsettled": "no motion of the frame was found, with any weight; the start is far off: see Fig. 13 "
