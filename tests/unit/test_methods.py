@@ -9,7 +9,8 @@ from snakemake.utils import validate
 
 from addvc.images.hashes import content_hash
 from addvc.provenance import commit
-from addvc.report.methods import REFERENCES, STARTS, Citations, listing, methods, span
+from addvc.report.methods import STARTS, listing, methods, span
+from addvc.report.references import REFERENCES, Citations
 
 ROOT = Path(__file__).parents[2]
 MESH = {"nodes": 71416, "cells": 239573, "mean_edge": 12.34, "mean_volume": 0.117,
@@ -17,7 +18,7 @@ MESH = {"nodes": 71416, "cells": 239573, "mean_edge": 12.34, "mean_volume": 0.11
 SCANS = {"scans": [{"shape": [120, 140, 120]}] * 3, "bin": 3}
 
 
-def state(number, converged=True, error=None):
+def state(number, converged=True, error=None, weight=1e4):
     found = {
         "converged": converged,
         "l_e": 11.5 * number,
@@ -27,7 +28,7 @@ def state(number, converged=True, error=None):
     }
     struts = {"valid": 340, "bending_share": 0.7 + 0.05 * number}
     return {"label": f"{number} %", "micro": found, "struts": struts, "cells": {"bands": 1},
-            "uncertainty": {"rms": 0.05 + 0.01 * number}}  # fmt: skip
+            "uncertainty": {"rms": 0.05 + 0.01 * number}, "equilibrium": {"weight": weight}}  # fmt: skip
 
 
 def summary(*states):
@@ -77,6 +78,16 @@ def test_each_method_is_told_with_what_it_uses():
     for word in ("neighbours", "Geman-McClure", "turns", "void within", "equilibrium gap"):
         assert word not in plain
     assert "Labelle" not in told(config() | {"mesh": {"backend": "pytetwild"}})
+
+
+def test_the_states_in_equilibrium_are_told():
+    assert "displacement in every state, with the weight" in told(config())
+    some = told(config(), state(1), state(2, weight=None), state(3))
+    assert "displacement at 1 % and 3 % only" in some and "even if noise were twice" in some
+    none = told(config(), state(1, weight=None))
+    assert "displacement as it is" in none and "cross-validation" not in none
+    off = told(config() | {"struts": {"equilibrium": False}})
+    assert "equilibrium of" not in off and "cross-validation" not in off
 
 
 @pytest.mark.parametrize("chosen", [["corotational", "eq10"], ["eq10"]])

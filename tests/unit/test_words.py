@@ -265,6 +265,32 @@ def test_many_flagged_struts_have_a_warning(flagged, warned):
     assert (f"State 1: {flagged} of {100 + flagged} struts (at most 10 %)" in text) == warned
 
 
+@pytest.mark.parametrize(
+    ("notes", "words"),
+    [
+        (
+            {"refused": "unseen", "carrying": 0.31},
+            ("31% of the nodes", "at least 50%", "mesh.size"),
+        ),
+        (
+            {"refused": "harm", "misfit": 0.41, "bound": 0.15},
+            ("0.410 voxel (at most 0.150)", "hinge"),
+        ),
+    ],
+)
+def test_struts_that_are_not_in_equilibrium_have_a_warning(notes, words):
+    case = {"weight": None, "carrying": 0.9, "nodes": 700, "frame_nodes": 90} | notes
+    (text,) = warnings(summary(GOOD | {"equilibrium": case}))
+    assert "State 1: struts are as measured" in text and "null" in text and "trust" in text
+    for word in words:
+        assert word in text
+
+
+@pytest.mark.parametrize("notes", [None, {"weight": 1e4, "refused": None}])
+def test_struts_in_equilibrium_and_those_that_should_not_be_have_no_warning(notes):
+    assert warnings(summary(GOOD | {"equilibrium": notes})) == ["None."]
+
+
 @pytest.mark.parametrize(("kept", "warned"), [(0.91, False), (0.85, True)])
 def test_solid_that_was_left_out_has_a_warning(kept, warned):
     case = summary(GOOD)

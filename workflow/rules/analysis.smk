@@ -368,9 +368,9 @@ rule uncertainty:
 
 rule strut_frame:
     input:
-        solid=f"{R}/geometry/solid.h5",
         threshold=f"{R}/geometry/threshold.json",
         reference=f"{R}/volumes/volume0.h5",
+        blurred=f"{R}/volumes/smooth0.h5",
         region=f"{R}/geometry/region.json",
     output:
         f"{R}/geometry/frame.h5",

@@ -10,8 +10,8 @@ with job(snakemake) as log:
     source = snakemake.input
     levels, region = read_json(source.threshold), Region(**read_json(source.region))
     excess = load_volume(source.reference)[0] - levels["void"]
-    kept = load_volume(source.solid)[0] > levels["threshold"]
-    held = strut_frame(excess, kept, levels["threshold"] - levels["void"], region)
+    blurred = load_volume(source.blurred)[0] - levels["void"]
+    held = strut_frame(excess, blurred, levels["threshold"] - levels["void"], region)
     counts = len(held.frame.points), len(held.frame.pieces), int(held.loaded.sum())
     log.info("%d nodes, %d pieces, %d nodes where the frame is cut", *counts)
     save_frame(snakemake.output[0], held)

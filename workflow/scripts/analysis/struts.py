@@ -1,6 +1,6 @@
 """What every strut undergoes in a state: motion, bending, stretching, twist, their energies."""
 
-from addvc.analysis.frame_filter import micro_fields
+from addvc.analysis.balance import micro_fields
 from addvc.analysis.noise import turned
 from addvc.analysis.strut_frame import load_frame
 from addvc.analysis.strut_store import load_partition, write_columns

@@ -12,8 +12,13 @@ from addvc.fem.frame import Frame, FrameMotion, skew
 FEW = 6
 """Pieces whose middles are nearest to a point: one of them is the nearest."""
 
-NEAR, WINDOW = 60, 2.5
-"""Nodes of the mesh, and the width of their window in voxels, that the first motion is found from."""
+NEAR, WINDOW, WINDOW_RADII = 60, 2.5, 1.5
+"""Nodes of the mesh, and the width of their window in voxels, or in radii of the struts where these
+are more, that the first motion is found from."""
+
+BEYOND, REACH_RADII = 1.5, 1.6
+"""How far from the axis of a strut its nodes may be: voxels that its line may be off, and radii of a
+round section of its area, of which the corner of a triangle has 1.56."""
 
 FAR = 1e-6
 """Weight of those beyond the window."""
@@ -22,16 +27,23 @@ FAR = 1e-6
 @dataclass(frozen=True, eq=False)
 class Attached:
     """Points (k,) that are carried by pieces (k,) of a frame, at shares (k, 1) between their ends,
-    with arms (k, 3) from the axis; `distance` (k,) from it."""
+    with arms (k, 3) from the axis; `distance` (k,) from it, `radius` (k,) of the pieces."""
 
     ends: np.ndarray
     share: np.ndarray
     arm: np.ndarray
     distance: np.ndarray
+    radius: np.ndarray
+
+    @property
+    def within(self) -> np.ndarray:
+        """Which points, bool (k,), are near enough to move with the frame."""
+        return self.distance < BEYOND + REACH_RADII * self.radius
 
     def __getitem__(self, some: np.ndarray) -> "Attached":
         """Some of the points, bool (k,)."""
-        return Attached(self.ends[some], self.share[some], self.arm[some], self.distance[some])
+        parts = (self.ends, self.share, self.arm, self.distance, self.radius)
+        return Attached(*(part[some] for part in parts))
 
     @classmethod
     def of(cls, frame: Frame, points: np.ndarray) -> "Attached":
@@ -44,9 +56,10 @@ class Attached:
         arm = points[:, None] - start[near] - share[..., None] * chord[near]
         distance = np.linalg.norm(arm, axis=2)
         rows, best = np.arange(len(points)), distance.argmin(axis=1)
+        piece = near[rows, best]
         return cls(
-            frame.pieces[near[rows, best]], share[rows, best, None], arm[rows, best],
-            distance[rows, best],
+            frame.pieces[piece], share[rows, best, None], arm[rows, best], distance[rows, best],
+            frame.radius[piece],
         )  # fmt: skip
 
     def turned(self, motion: FrameMotion) -> np.ndarray:
@@ -78,7 +91,8 @@ def first_motion(frame: Frame, points: np.ndarray, u: np.ndarray) -> FrameMotion
     """Each node as the points (k, 3) around it, displaced by u (k, 3), move on the whole."""
     few = min(NEAR, len(points))
     distance, near = cKDTree(points).query(frame.points, k=few)
-    weight = np.exp(-0.5 * (distance / WINDOW) ** 2) + FAR
+    width = np.maximum(WINDOW, WINDOW_RADII * frame.radius_at_nodes)[:, None]
+    weight = np.exp(-0.5 * (distance / width) ** 2) + FAR
     positions, rotations = np.empty_like(frame.points), np.empty((len(frame.points), 3, 3))
     for n, (own, w) in enumerate(zip(near, weight, strict=True)):
         before, now = points[own], points[own] + u[own]

@@ -14,13 +14,15 @@ generalised cross-validation [Golub1979]
 
 S n being what the filter keeps of draws n of the noise, so that neither a truth nor the level of the
 noise is needed. Assumed are slender elastic struts of one stiffness, without contacts. Where they are
-not (hinges, contacts, struts that were not seen) the misfit is more than noise: a weight counts only
-if by Stein's estimate [Stein1981] the filtered displacement is nearer the truth than the measured one,
+not (hinges, contacts, struts that were not seen) the misfit is more than noise. By Stein's estimate
+[Stein1981] the filtered displacement is nearer the truth than the measured one where
 
     |u - u_w|^2 - s^2 E|n|^2 + 2 s^2 E n . S n < s^2 E|n|^2,
 
-even if the noise were s = 2 times that of the draws; else struts are measured as they are. The truth
-of the twin is a network of beams too, which flatters the filter; hinging struts are the test against it.
+s: the noise over that of its draws. More noise lets more misfit pass, and a weight counts if this holds
+for s = 2: the filter is refused only where it would do harm even if the noise were twice its draws.
+The truth of the twin is a network of beams too, which flatters the filter; hinging struts are the test
+against it.
 """
 
 import logging
@@ -30,9 +32,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from addvc.analysis.carried import NEAR, Attached, first_motion
+from addvc.analysis.carried import Attached
 from addvc.analysis.strut_frame import StrutFrame
-from addvc.analysis.strut_table import RAW, Measured
 from addvc.fem.frame import FrameMotion, forces
 
 log = logging.getLogger(__name__)
@@ -49,23 +50,8 @@ DAMPED = 1e-4
 little at a time."""
 
 DOUBTED = 2.0
-"""By how much the noise may exceed its draws, which know of no robust weights and no lost struts."""
-
-FEW = 4
-"""Draws that choose the weight: each is a sum over all nodes."""
-
-CARRYING = 0.5
-"""Share of the nodes of the frame that valid nodes of the mesh must be nearest to: of fewer, what was
-not seen decides."""
-
-REACH = 3.5
-"""Farthest node of the mesh that moves with the frame, voxels from its axis."""
-
-UNBALANCED = (
-    "WARNING: struts are as measured: %.0f %% of the frame carry valid nodes of the mesh (%.0f %% are "
-    "needed), or no equilibrium explains the displacement better than noise does; "
-    "mesh.size or the threshold may be too large, or set struts.equilibrium: false"
-)
+"""By how much the noise may exceed its draws, which know of no robust weights and no lost struts; the
+more, the more misfit is put down to it."""
 
 ITERATIONS, SETTLED = 8, 5e-3
 """Of Gauss-Newton for each weight, at most, and the rms of the last step of the nodes of the mesh,
@@ -114,27 +100,43 @@ def middle(matrix: sparse.spmatrix) -> float:
     return float(np.median(diagonal[diagonal > 0]))
 
 
+Solve = Callable[[np.ndarray], np.ndarray]
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The motion of the frame with a weight; mean squares of the misfit and of what the filter takes
-    from draws of the noise, voxel^2; the share of their square that it leaves; V(w); whether the
-    filter helps."""
+    """The motion of the frame with a weight; mean squares of the misfit, of the greatest with which the
+    filter may help, and of what it takes from draws of the noise, voxel^2; the share of their square
+    that it leaves; V(w); how the frame follows points, by their slopes (3 k, 6 n)."""
 
     weight: float
     motion: FrameMotion
     misfit: float
+    bound: float
     taken: float
     kept: float
     validation: float
-    helps: bool
+    solve: Solve
+    slopes: sparse.csr_matrix
+
+    @property
+    def helps(self) -> bool:
+        """Whether the filter brings the displacement nearer the truth, if the noise is DOUBTED times
+        its draws."""
+        return self.misfit < self.bound
 
     @property
     def excess(self) -> float:
         """The misfit over what the noise explains, at least one."""
         return max(1.0, (self.misfit / self.taken) ** 0.5)
 
+    def left(self, draws: np.ndarray, at: sparse.csr_matrix | None = None) -> np.ndarray:
+        """What the filter leaves of draws (d, k, 3) of the noise, at the points or where a step of the
+        frame moves others by the slopes `at` (3 q, 6 n): (d, q, 3)."""
+        return filtered(self.solve, self.slopes, draws, at)
 
-def solver(matrix: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray] | None:
+
+def solver(matrix: sparse.csc_matrix) -> Solve | None:
     """x (N,) of matrix (N, N) x = b, for any b; None where it is not positive definite. Pivots are not
     looked at, as `fem.solver` does: squared equations of balance are all but singular, and
     Gauss-Newton mends what is lost."""
@@ -166,26 +168,26 @@ def fitted(
 
 
 def filtered(
-    problem: Problem,
-    motion: FrameMotion,
-    weight: float,
-    draws: np.ndarray,
-    at: sparse.csr_matrix | None = None,
+    solve: Solve, slopes: sparse.csr_matrix, draws: np.ndarray, at: sparse.csr_matrix | None = None
 ) -> np.ndarray:
-    """What the filter leaves of draws (d, k, 3) of the noise, at the points or where a step of the
-    frame moves others by the slopes `at` (3 q, 6 n): (d, q, 3)."""
-    matrix, _, slopes = problem.system(motion, weight)
-    solve, at = solver(matrix), slopes if at is None else at
+    """What of draws (d, k, 3) the frame follows, at the points of slopes (3 k, 6 n) or at others of
+    slopes `at` (3 q, 6 n): (d, q, 3)."""
+    at = slopes if at is None else at
     return np.stack([(at @ solve(slopes.T @ n.ravel())).reshape(-1, 3) for n in draws])
 
 
-def judged(problem: Problem, motion: FrameMotion, weight: float, draws: np.ndarray) -> Fit:
-    """The fit with what the filter does to draws (d, k, 3) of the noise."""
-    left, noise = filtered(problem, motion, weight, draws), mean_square(draws)
+def judged(problem: Problem, motion: FrameMotion, weight: float, draws: np.ndarray) -> Fit | None:
+    """The fit with what the filter does to draws (d, k, 3) of the noise, not all of them zero; None
+    where the matrix is not positive definite."""
+    matrix, _, slopes = problem.system(motion, weight)
+    solve = solver(matrix)
+    if solve is None:
+        return None
+    left, noise = filtered(solve, slopes, draws), mean_square(draws)
     misfit, kept = mean_square(problem.error(motion)), mean_square(left) / noise
     cut = 1 - float(np.sum(left * draws) / np.sum(np.square(draws, dtype=float)))
-    helps = misfit < 2 * DOUBTED**2 * cut * noise
-    return Fit(weight, motion, misfit, mean_square(draws - left), kept, misfit / cut**2, helps)
+    bound, taken = 2 * DOUBTED**2 * cut * noise, mean_square(draws - left)
+    return Fit(weight, motion, misfit, bound, taken, kept, misfit / cut**2, solve, slopes)
 
 
 def mean_square(x: np.ndarray) -> float:
@@ -195,67 +197,16 @@ def mean_square(x: np.ndarray) -> float:
 
 def best_fit(problem: Problem, motion: FrameMotion, draws: np.ndarray) -> Fit | None:
     """Over all weights, from the smallest on, the fit that cross-validation likes best of those that
-    help; None where none has settled or helps."""
-    best, motion = None, fitted(problem, motion, 0.0, RELAXED) or motion
+    help; where none does, of all; None where none has settled."""
+    fits, motion = [], fitted(problem, motion, 0.0, RELAXED) or motion
     for weight in WEIGHTS:
         found = fitted(problem, motion, weight)
-        if found is None:
+        fit = judged(problem, found, weight, draws) if found else None
+        if fit is None:
             log.info("weight %.3g: not settled in %d iterations", weight, ITERATIONS)
             continue
-        motion = found
-        fit = judged(problem, motion, weight, draws)
+        motion = fit.motion
         log.info("weight %.3g: misfit %.4f voxel, V^0.5 %.4f voxel, %s", weight, fit.misfit**0.5,
                  fit.validation**0.5, "helps" if fit.helps else "does not help")  # fmt: skip
-        if fit.helps and (best is None or fit.validation < best.validation):
-            best = fit
-    return best
-
-
-def balanced(
-    held: StrutFrame, measured: Measured, valid: np.ndarray, nu: float
-) -> tuple[Measured, dict]:
-    """What was measured, with its draws of the noise, as the frame moves it at nodes within REACH, by
-    those that are `valid` (n,); nothing changes where no motion is found. Notes: the weight, the rms
-    misfit, by how much it exceeds what the noise at rest explains (the draws are scaled up so that it
-    does explain it), the share of the noise that is left; the share of the frame that was seen."""
-    attached = Attached.of(held.frame, measured.points) if len(held.frame.pieces) else None
-    near = np.zeros(len(valid), dtype=bool) if attached is None else attached.distance < REACH
-    use = near & (valid > 0)
-    share = len(np.unique(attached.ends[use])) / len(held.frame.points) if use.any() else 0.0
-    fit, draws = None, measured.draws[:, use]
-    if share >= CARRYING and use.sum() > NEAR:
-        points, u = measured.points[use], measured.u[use]
-        problem = Problem(held, attached[use], points + u, nu)
-        fit = best_fit(problem, first_motion(held.frame, points, u), draws[:FEW])
-    if fit is None:
-        log.warning(UNBALANCED, 100 * share, 100 * CARRYING)
-        return measured, {"weight": None, "carrying": share}
-    return carried_along(problem, fit, draws, attached, measured), {
-        "weight": float(fit.weight), "carrying": share, "misfit": fit.misfit**0.5,
-        "misfit_over_noise": fit.excess, "noise_left": fit.kept**0.5,
-    }  # fmt: skip
-
-
-def carried_along(
-    problem: Problem, fit: Fit, draws: np.ndarray, attached: Attached, measured: Measured
-) -> Measured:
-    """The motion of a fit at all nodes within REACH, and what it leaves of draws (d, k, 3) of the noise
-    at those of the problem."""
-    near = attached.distance < REACH
-    u, left, own = measured.u.copy(), measured.draws.copy(), attached[near]
-    u[near] = own.moved(fit.motion) - measured.points[near]
-    left[:, near] = fit.excess * filtered(
-        problem, fit.motion, fit.weight, draws, own.slopes(fit.motion)
-    )
-    return Measured(measured.points, u, left)
-
-
-def micro_fields(
-    held: StrutFrame | None, measured: Measured, valid: np.ndarray, nu: float
-) -> tuple[dict[str, Measured], dict | None]:
-    """What struts are measured on, by the ending of its columns, and the notes of `balanced`; the
-    measured displacement alone where there is no frame."""
-    if held is None:
-        return {"": measured}, None
-    filtered_field, notes = balanced(held, measured, valid, nu)
-    return {"": filtered_field, RAW: measured}, notes
+        fits.append(fit)
+    return min(fits, key=lambda fit: (not fit.helps, fit.validation), default=None)

@@ -1,8 +1,7 @@
 """The whole foam as a frame of beams, thin struts included, from the grey level of the reference.
 
 The mesh of micro DVC holds what the threshold for the porosity keeps; it loses thin struts, which
-carry load all the same. A lower threshold keeps the network whole: its skeleton gives the struts,
-the centroids of the grey level their lines, the grey level per length their sections. A junction is
+carry load all the same. A lower threshold keeps the network whole (`geometry.sections`). A junction is
 the point nearest to the lines of its struts, continued straight on.
 """
 
@@ -17,18 +16,19 @@ from scipy.spatial import cKDTree
 from addvc.fem.frame import Frame
 from addvc.geometry.centre_line import Curve
 from addvc.geometry.region import Region
-from addvc.geometry.sections import CUT, Solid, cut_depth, grey_struts, sections_of
+from addvc.geometry.sections import CUT, Solid, cut_depth, grey_struts, mean_radius, sections_of
 from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
 from addvc.images.files import atomic_path
 
-PIECE = 2.6
-"""Target length of a piece, voxels."""
+PIECE, PIECE_RADII = 2.6, 1.2
+"""Target length of a piece: voxels, and radii of its strut where these are more."""
 
 SHORTEST = 0.8
-"""A piece from the end of a line to its junction, at least, voxels."""
+"""A piece, at least, voxels: its stiffness goes with one over its length."""
 
-ASTRAY = 1.5
-"""How far from the skeleton's a junction may be put, voxels."""
+ASTRAY, ASTRAY_RADII = 1.5, 0.6
+"""How far from the skeleton's a junction may be put: voxels, and radii of its ball where these are
+more."""
 
 DOUBT = 0.1
 """Weight of the skeleton's junction against the line of one strut."""
@@ -44,10 +44,12 @@ class StrutFrame:
     span: float
 
 
-def strut_frame(excess: np.ndarray, kept: np.ndarray, limit: float, region: Region) -> StrutFrame:
-    """The frame of the solid of grey level excess (nx, ny, nz) above the void; `limit`: the threshold
-    for the porosity above the void, kept (nx, ny, nz): what it keeps; all within the region."""
-    found = grey_struts(excess, kept, limit, region)
+def strut_frame(
+    excess: np.ndarray, blurred: np.ndarray, limit: float, region: Region
+) -> StrutFrame:
+    """The frame of the solid within the region, of grey levels (nx, ny, nz) above that of the void:
+    excess as scanned, blurred as the threshold for the porosity is of, which is `limit` above it."""
+    found = grey_struts(excess, blurred, limit, region)
     if not found.graph.branches:
         return StrutFrame(Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0)),
                           np.zeros(0, bool), 0.0)  # fmt: skip
@@ -69,8 +71,18 @@ def crossings(graph: StrutGraph, curves: list[Curve]) -> np.ndarray:
             matrix[end] += across
             right[end] += across @ curve(s)[0]
     step = np.linalg.solve(matrix, right[..., None])[..., 0] - graph.junctions
-    far = np.linalg.norm(step, axis=1, keepdims=True)
-    return graph.junctions + step * np.minimum(1, ASTRAY / np.maximum(far, ASTRAY))
+    far, most = np.linalg.norm(step, axis=1), astray(graph)
+    return graph.junctions + step * np.minimum(1, most / np.maximum(far, 1e-12))[:, None]
+
+
+def astray(graph: StrutGraph) -> np.ndarray:
+    """How far from the skeleton's each junction (j,) may be put, so that none comes nearer than
+    SHORTEST to another."""
+    most = np.maximum(ASTRAY, ASTRAY_RADII * graph.radii)
+    if len(most) < 2:
+        return most
+    apart = cKDTree(graph.junctions).query(graph.junctions, k=2)[0][:, 1]
+    return np.clip((apart - SHORTEST) / 2, 0, most)
 
 
 def assembled(
@@ -81,28 +93,44 @@ def assembled(
     junctions = crossings(graph, curves)
     points, pieces, area, count = [junctions], [], [], len(junctions)
     for branch, curve, own in zip(graph.branches, curves, owned, strict=True):
-        s = stations(branch, curve, junctions)
-        first, second = (np.array([end] if end != FREE_END else [], int) for end in branch.ends)
-        inner = count + np.arange(len(s))
-        chain = np.concatenate([first, inner, second])
-        at = np.concatenate([s[:1][: len(first)], (s[1:] + s[:-1]) / 2, s[-1:][: len(second)]])
+        radius = mean_radius(solid.share[own].sum(), 2 * curve.half)
+        s = stations(branch, curve, junctions, max(PIECE, PIECE_RADII * radius))
+        chain = linked(branch, count + np.arange(len(s)))
         points.append(curve(s))
-        pieces.append(np.stack([chain[:-1], chain[1:]], axis=1))
+        pieces.append(chain)
+        at = middles(branch, s) if len(s) else np.full(len(chain), curve.middle)
         area.append(sections_of(curve, at, solid.voxels[own], solid.share[own]))
         count += len(s)
     frame = Frame(*(np.concatenate(part) for part in (points, pieces, area)))
-    return frame, float(np.median([len(part) * PIECE for part in pieces]))
+    strut = np.repeat(np.arange(len(pieces)), [len(part) for part in pieces])
+    return frame, float(np.median(np.bincount(strut, frame.length)))
 
 
-def stations(branch: Branch, curve: Curve, junctions: np.ndarray) -> np.ndarray:
-    """Arc lengths (g,) of a curve where its nodes are: none so near to a junction that the piece
-    between them would be short."""
-    s = curve.middle + curve.half * np.linspace(-1, 1, max(2, round(2 * curve.half / PIECE)) + 1)
-    near = [
-        int(end != FREE_END and np.linalg.norm(curve(s[[k]])[0] - junctions[end]) < SHORTEST)
-        for end, k in zip(branch.ends, (0, -1), strict=True)
-    ]
-    return s[near[0] : len(s) - near[1]]
+def linked(branch: Branch, inner: np.ndarray) -> np.ndarray:
+    """Pieces (m, 2) along the nodes (g,) of a strut, from its junction to its junction; none of a strut
+    without nodes that ends where it starts."""
+    first, second = (np.array([end] if end != FREE_END else [], int) for end in branch.ends)
+    chain = np.concatenate([first, inner, second])
+    pieces = np.stack([chain[:-1], chain[1:]], axis=1)
+    return pieces[pieces[:, 0] != pieces[:, 1]]
+
+
+def middles(branch: Branch, s: np.ndarray) -> np.ndarray:
+    """Arc lengths (m,) of the pieces between nodes at s (g,); of those to junctions, their nodes."""
+    first, second = (int(end != FREE_END) for end in branch.ends)
+    return np.concatenate([s[:first], (s[1:] + s[:-1]) / 2, s[len(s) - second :]])
+
+
+def stations(branch: Branch, curve: Curve, junctions: np.ndarray, piece: float) -> np.ndarray:
+    """Arc lengths (g,) of a curve where its nodes are, about a piece apart; none that is nearer than
+    SHORTEST to another or to a junction, so that a short curve may have no node."""
+    s = curve.middle + curve.half * np.linspace(-1, 1, max(2, round(2 * curve.half / piece)) + 1)
+    taken, kept = [junctions[end] for end in branch.ends if end != FREE_END], []
+    for k, point in enumerate(curve(s)):
+        if all(np.linalg.norm(point - other) >= SHORTEST for other in taken):
+            taken.append(point)
+            kept.append(k)
+    return s[kept]
 
 
 def loaded(points: np.ndarray, mask: np.ndarray, region: Region) -> np.ndarray:

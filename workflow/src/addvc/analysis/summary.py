@@ -98,6 +98,7 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
     micro_notes = load_notes(folder / f"dvc/micro_start_state{state}.h5")
+    struts = read_json(folder / f"struts_state{state}.json")
     return result | {
         "strain": strain,
         "start": notes["best"],
@@ -106,7 +107,8 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
         "micro_candidates": micro_notes["candidates"],
         "freeform": freeform_figures(folder, state, scope.truth) if scope.freeform else None,
         "verdict": verdict(best["converged"], best["valid_nodes"]),
-        "struts": read_json(folder / f"struts_state{state}.json")["foam"][micro],
+        "struts": struts["foam"][micro],
+        "equilibrium": struts["equilibrium"],
         "uncertainty": read_json(folder / f"analysis/uncertainty_state{state}.json"),
         "warp": read_json(folder / f"analysis/warp_state{state}.json"),
         "cells": read_json(folder / f"cells_state{state}.json")["localisation"],

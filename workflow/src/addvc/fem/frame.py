@@ -40,6 +40,18 @@ class Frame:
         return np.linalg.norm(self.chord, axis=1)
 
     @property
+    def radius(self) -> np.ndarray:
+        """(m,) of the round sections of the pieces."""
+        return np.sqrt(self.area / np.pi)
+
+    @property
+    def radius_at_nodes(self) -> np.ndarray:
+        """(n,) of the pieces that meet at a node, on average; zero where there is none."""
+        ends, count = self.pieces.ravel(), len(self.points)
+        total = np.bincount(ends, np.repeat(self.radius, 2), count)
+        return total / np.maximum(np.bincount(ends, minlength=count), 1)
+
+    @property
     def dofs(self) -> np.ndarray:
         """(m, 12): three of translation and three of rotation for either end."""
         return (6 * self.pieces[:, :, None] + np.arange(6)).reshape(len(self.pieces), 12)

@@ -54,11 +54,11 @@ def bridged(
     """`smooth` (nx, ny, nz), blurred, raised along all bridges (a copy), and where those are: middle,
     length of the gap, mean radius, voxels; the longest first.
 
-    Struts are found in `reference`, as it was before the blur; `levels`: `find_threshold`; `size`: the
-    edge of the mesh's lattice, that no rod is too thin for."""
+    Struts are found in `reference`, as it was before the blur, unless its noise forbids; `levels`:
+    `find_threshold`; `size`: the edge of the mesh's lattice, that no rod is too thin for."""
     gamma, void = levels["threshold"], levels["void"]
     solid = within(region, smooth.shape) & (smooth > gamma)
-    struts = grey_struts(reference - void, solid, gamma - void, region)
+    struts = grey_struts(reference - void, smooth - void, gamma - void, region)
     least = max(LINKED, NECK * size)
     bridges = [bridge(struts, gap, least) for gap in wanted_gaps(struts, solid, region)]
     raised, slope = smooth.copy(), CAP_SLOPE * (levels["solid"] - void)

@@ -1,7 +1,8 @@
 """Struts by their grey level: those that a threshold loses too, their centre lines, their sections.
 
-A threshold below that for the porosity keeps the network whole: its skeleton gives the struts, the
-centroids of the grey level their lines, the grey level per length their sections.
+A threshold below that for the porosity keeps the network whole (`solid_mask`): its skeleton gives the
+struts, the centroids of the grey level their lines, the grey level per length their sections; both
+bear noise and are of the image as scanned.
 """
 
 from dataclasses import dataclass
@@ -13,9 +14,7 @@ from addvc.geometry.centre_line import Curve, along, arc_length, centre_line
 from addvc.geometry.lines import nearest_line, resampled
 from addvc.geometry.region import Region, caps_depth
 from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph, strut_graph
-
-LOWER = 0.8
-"""Of the threshold for the porosity, above the void: where no strut is lost yet and none is made up."""
+from addvc.geometry.solid_mask import solid_mask
 
 TRIMMED = 0.3
 """Most of a strut that a junction takes at each end, where the balls of both would leave nothing."""
@@ -53,14 +52,16 @@ class GreyStruts:
     solid: Solid
 
 
-def grey_struts(excess: np.ndarray, kept: np.ndarray, limit: float, region: Region) -> GreyStruts:
-    """The struts of a solid of grey level excess (nx, ny, nz) above the void; `limit`: the threshold
-    for the porosity above the void, kept (nx, ny, nz): what it keeps; all within the region."""
+def grey_struts(
+    excess: np.ndarray, blurred: np.ndarray, limit: float, region: Region
+) -> GreyStruts:
+    """The struts of the solid within the region, of grey levels (nx, ny, nz) above that of the void:
+    excess as scanned, blurred as the threshold for the porosity is of, which is `limit` above it."""
     inside = within(region, excess.shape)
-    mask = largest(inside & (excess > LOWER * limit))
+    mask = solid_mask(excess, blurred, limit, inside)
     graph = strut_graph(mask)
     near = ndimage.binary_dilation(mask, iterations=HALO) & inside
-    contrast = excess[near].sum() / max((kept & inside).sum(), 1)
+    contrast = excess[near].sum() / max((inside & (blurred > limit)).sum(), 1)
     solid = Solid(np.argwhere(near).astype(float), excess[near] / contrast, excess * inside)
     if not graph.branches:
         return GreyStruts(mask, graph, [], [], [], solid)
@@ -80,12 +81,9 @@ def within(region: Region, shape: tuple[int, ...]) -> np.ndarray:
     return (ends > 0) & (sides > 0)
 
 
-def largest(mask: np.ndarray) -> np.ndarray:
-    """The largest component (nx, ny, nz), of 26 neighbours."""
-    label, _ = ndimage.label(mask, np.ones((3, 3, 3)))
-    count = np.bincount(label.ravel(), minlength=2)
-    count[0] = 0
-    return (label == count.argmax()) & mask
+def mean_radius(volume: float, length: float) -> float:
+    """Of a round strut, voxels."""
+    return float(np.sqrt(max(volume, LEAST_AREA) / (np.pi * length)))
 
 
 def strut_curve(
@@ -93,7 +91,7 @@ def strut_curve(
 ) -> Curve:
     """The centre line of a strut of this volume between the balls of its junctions, of radii (j,)."""
     length = arc_length(line)[-1]
-    radius = np.sqrt(max(volume, LEAST_AREA) / (np.pi * length))
+    radius = mean_radius(volume, length)
     trims = np.array([0.0 if end == FREE_END else radii[end] for end in branch.ends])
     if length - trims.sum() < 2 * radius:
         trims = np.minimum(trims, TRIMMED * length)
@@ -106,7 +104,7 @@ def sections_of(
     """Areas (g,) at arc lengths (g,) of a curve from the shares (q,) of solid of its voxels (q, 3)."""
     line = curve(np.linspace(curve.middle - curve.half, curve.middle + curve.half, len(voxels) + 2))
     s = curve.projected(voxels, curve.middle - curve.half + along(line, voxels))
-    radius = np.sqrt(max(share.sum(), LEAST_AREA) / (2 * curve.half * np.pi))
+    radius = mean_radius(share.sum(), 2 * curve.half)
     return np.maximum(section_areas(stations, s, share, max(radius / 2, 0.5)), LEAST_AREA)
 
 

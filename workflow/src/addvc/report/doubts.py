@@ -1,5 +1,6 @@
 """What to distrust in a result: the section of the first page that is never silently empty."""
 
+from addvc.analysis.balance import refusal
 from addvc.report.page_tables import figure, micro_name
 
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
@@ -79,7 +80,19 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
             f"- State {state['state']} could not be registered: at least half of its nodes "
             "have a residual far above the noise of the images."
         )
-    return found + residual_warnings(state, micro_name(summary))
+    return found + equilibrium_warnings(state) + residual_warnings(state, micro_name(summary))
+
+
+def equilibrium_warnings(state: dict) -> list[str]:
+    """One line where struts should be measured in equilibrium (`struts.equilibrium`) and are not."""
+    reason = refusal(state.get("equilibrium") or {})
+    if reason is None:
+        return []
+    return [
+        f"- State {state['state']}: struts are as measured, with all the noise (weight of the "
+        f"equilibrium null): {reason}. Noise adds to axial strain and stretching: of struts trust "
+        "those with a `dominance` that is not undecided, and compare no such state with others."
+    ]
 
 
 def residual_warnings(state: dict, micro: str) -> list[str]:
