@@ -33,11 +33,15 @@ def warnings(summary: dict) -> list[str]:
 def topology_warnings(counts: dict | None) -> list[str]:
     """One line when the mesh of the struts has stubs, necks or welds."""
     names = {
-        "stubs": "dangling stubs",
-        "necks": "necks thinner than a square voxel",
-        "welds": "welds torn by the displacement",
+        "stubs": "dangling stub{s}",
+        "necks": "neck{s} thinner than a square voxel",
+        "welds": "weld{s} torn by the displacement",
     }
-    some = [f"{counts[key]} {name}" for key, name in names.items() if counts and counts[key]]
+    some = [
+        f"{counts[key]} {name.format(s='' if counts[key] == 1 else 's')}"
+        for key, name in names.items()
+        if counts and counts[key]
+    ]
     if not some:
         return []
     return [
