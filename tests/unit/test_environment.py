@@ -205,7 +205,7 @@ def test_missing_system_packages_are_asked_for_in_one_command(copy):
 )
 def test_run_uses_all_cores_unless_told_and_passes_the_rest_on(ready, words, given):
     result, calls = ready("run", *words.split())
-    assert calls[0] == f"snakemake --rerun-incomplete --logger addvc {given}"
+    assert calls[0] == f"snakemake --rerun-incomplete --logger=addvc {given}"
     assert result.returncode == 7  # snakemake's own
 
 
@@ -257,7 +257,7 @@ def test_lock_of_a_killed_run_is_cleared_but_not_that_of_a_live_one(ready):
         result, calls = ready("run", "-c1")
         live.terminate()
     assert f"snakemake is at work in this folder (process {live.pid})" in result.stderr
-    assert calls[0] == "snakemake --rerun-incomplete --logger addvc -c1"
+    assert calls[0] == "snakemake --rerun-incomplete --logger=addvc -c1"
 
 
 def test_lock_held_from_another_machine_is_left_alone(ready):
@@ -270,4 +270,4 @@ def test_lock_held_from_another_machine_is_left_alone(ready):
     log.write_text("SNAKEMAKE\n  Host: elsewhere\n")
     result, calls = ready("run", "-c1")
     assert "locked by a run on elsewhere" in result.stderr
-    assert calls[0] == "snakemake --rerun-incomplete --logger addvc -c1"
+    assert calls[0] == "snakemake --rerun-incomplete --logger=addvc -c1"
