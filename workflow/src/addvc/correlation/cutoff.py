@@ -29,8 +29,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from addvc.correlation.metric import geman_mcclure, hessian, residual, right_hand_side
-from addvc.correlation.register import System
+from addvc.correlation.metric import hessian, residual, right_hand_side, robust_square
+from addvc.correlation.register import System, forces, pull
 from addvc.correlation.uncertainty import Noise, of_two_images
 from addvc.errors import CorrelationError
 from addvc.fem.assembly import node_pattern
@@ -76,8 +76,6 @@ def trial(system: System, deformed: np.ndarray, u: np.ndarray, ladder: Ladder) -
     """What every rung needs of `system`, whose u (n, 3) it is; `deformed`: spline coefficients."""
     reference = system.reference
     r, _ = residual(reference, deformed, u)
-    if system.scale is not None:
-        r = r * geman_mcclure(r, system.scale)
     draw = of_two_images(system, deformed.shape, ladder.noise)
     draws = [np.where(reference.inside, draw(), 0).astype(float) for _ in range(ladder.draws)]
     noise = [right_hand_side(reference, one) for one in draws]
@@ -85,10 +83,7 @@ def trial(system: System, deformed: np.ndarray, u: np.ndarray, ladder: Ladder) -
     whole = np.mean([reference.quadrature.weight @ one**2 for one in draws])
     left = whole - np.mean([taken(system, h, n) for n in noise])
     share = min(1.0, misfit(system, deformed, u) / left) if left > 0 else 1.0
-    forces = system.regularisation @ u.ravel()
-    if system.load is not None:
-        forces = forces + system.load
-    return Trial(system, deformed, u, h, right_hand_side(reference, r), forces, noise, share)
+    return Trial(system, deformed, u, h, pull(system, r), forces(system, u), noise, share)
 
 
 def taken(system: System, h: sparse.spmatrix, n: np.ndarray) -> float:
@@ -100,10 +95,7 @@ def taken(system: System, h: sparse.spmatrix, n: np.ndarray) -> float:
 def misfit(system: System, deformed: np.ndarray, u: np.ndarray) -> float:
     """S(u) of u (n, 3), grey levels^2 voxel: the robust one where the system is robust."""
     r, _ = residual(system.reference, deformed, u)
-    square = r.astype(float) ** 2
-    if system.scale is not None:
-        square /= 1 + square / system.scale**2
-    return float(system.reference.quadrature.weight @ square)
+    return float(system.reference.quadrature.weight @ robust_square(r, system.scale))
 
 
 def risk(trial: Trial, times: float) -> dict:

@@ -44,6 +44,12 @@ def geman_mcclure(r: np.ndarray, scale: float) -> np.ndarray:
     return 1 / (1 + (r / scale) ** 2) ** 2
 
 
+def robust_square(r: np.ndarray, scale: float | None) -> np.ndarray:
+    """rho(r) of `geman_mcclure` (Q,), float64; r^2 without a scale."""
+    square = r.astype(float) ** 2
+    return square if scale is None else square / (1 + square / scale**2)
+
+
 def residual(
     reference: Reference, deformed: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -71,14 +71,20 @@ class Downhill:
         system = self.system
         r, inside = residual(system.reference, self.deformed, u)
         self.sigma = residual_statistics(r, inside, system.reference.quadrature.weight)["std"]
-        if system.scale is not None:
-            r = r * geman_mcclure(r, system.scale)
-        b = right_hand_side(system.reference, r)
-        if system.load is not None:
-            b -= system.load
-        if system.regularisation is not None:
-            b -= system.regularisation @ u.ravel()
-        return b
+        return pull(system, r) - forces(system, u)
+
+
+def pull(system: System, r: np.ndarray) -> np.ndarray:
+    """Where residuals r (Q,) pull (3 n,): those far beyond the scale of the system hardly do."""
+    if system.scale is not None:
+        r = r * geman_mcclure(r, system.scale)
+    return right_hand_side(system.reference, r)
+
+
+def forces(system: System, u: np.ndarray) -> np.ndarray:
+    """M u + f (3 n,): what the regularisation holds against u (n, 3)."""
+    held = np.zeros(u.size) if system.load is None else system.load
+    return held if system.regularisation is None else held + system.regularisation @ u.ravel()
 
 
 def ending(solution: Solution, stop: Stop) -> str:
