@@ -7,7 +7,7 @@ are in it as they are in the residual; partial volumes of struts that turn are n
 
 import numpy as np
 
-from addvc.geometry.threshold import far_void, specimen_mask
+from addvc.geometry.threshold import far_void, robust_deviation, specimen_mask
 from addvc.images.specimen import Specimen
 from addvc.images.spline import spline_value
 
@@ -38,4 +38,4 @@ def pair_noise(
         for image in (reference, deformed)
     )
     r = (here[0] - there[0])[here[1] & there[1]]
-    return 1.4826 * float(np.median(np.abs(r - np.median(r))))
+    return robust_deviation(r)

@@ -9,9 +9,8 @@ import logging
 
 import numpy as np
 from scipy import ndimage
-from scipy.stats import median_abs_deviation
 
-from addvc.geometry.threshold import far_void
+from addvc.geometry.threshold import far_void, robust_deviation
 
 log = logging.getLogger(__name__)
 
@@ -42,7 +41,7 @@ def solid_mask(
 def void_deviation(excess: np.ndarray, void: np.ndarray) -> float:
     """Standard deviation of the grey level in the void, bool (nx, ny, nz), from its median; infinite
     where there is no void to tell it."""
-    return float(median_abs_deviation(excess[void], scale="normal")) if void.any() else np.inf
+    return robust_deviation(excess[void]) if void.any() else np.inf
 
 
 def largest(mask: np.ndarray) -> np.ndarray:

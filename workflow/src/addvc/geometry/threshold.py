@@ -56,7 +56,7 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
             f"{grey.max():.1f}; change geometry.threshold"
         )
     level = float(np.median(void))
-    noise = 1.4826 * float(np.median(np.abs(void - level)))
+    noise = robust_deviation(void)
     if gamma < level + 2 * noise:
         raise GeometryError(
             f"the threshold {gamma:.1f} is within 2 standard deviations of the void "
@@ -80,8 +80,12 @@ def void_noise(smooth: np.ndarray, mask: np.ndarray, gamma: float, away: int = 3
     void = mask & far_void(smooth, gamma, away)
     if void.sum() < 0.01 * mask.sum():
         return None
-    grey = smooth[void]
-    return 1.4826 * float(np.median(np.abs(grey - np.median(grey))))
+    return robust_deviation(smooth[void])
+
+
+def robust_deviation(x: np.ndarray) -> float:
+    """Standard deviation of what is normal but for outliers (n,): 1.48 times the median absolute one."""
+    return 1.4826 * float(np.median(np.abs(x - np.median(x))))
 
 
 def far_void(smooth: np.ndarray, gamma: float, away: int = 3) -> np.ndarray:
