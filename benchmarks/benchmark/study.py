@@ -16,7 +16,7 @@ from addvc.errors import AddvcError
 from addvc.fem.io import read_mesh, read_vtu
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 
 RESULTS = {"meso12": "meso 12", "freeform": "free-form", "micro-eq10": "micro, Eq. 10",
            "micro": "micro, corotational"}  # fmt: skip
@@ -88,11 +88,13 @@ def micro_with(folder: Path, config: dict, state: int, changes: dict) -> tuple[n
     start = time.process_time()
     micro, levels = config["micro"] | changes, read_json(folder / "geometry/threshold.json")
     cell = read_json(folder / "geometry/cell_size.json")["cell_size"]
-    images = [load_volume(folder / f"volumes/smooth{n}.h5")[0] for n in (0, state)]
+    splines = [load_coefficients(folder / f"volumes/smooth{n}.h5") for n in (0, state)]
+    images, degree = [grey for grey, _ in splines], splines[0][1]
     reference = micro_reference(
         read_mesh(folder / "geometry/micro.vtu"),
         images[0],
         load_quadrature(folder / "geometry/shell.h5"),
+        degree,
     )
     _, _, weights = elastic(reference, micro_options(micro, cell, settings.loading_axis(config)))
     order, _ = load_order(folder / "dvc/micro_factor.h5")

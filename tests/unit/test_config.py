@@ -54,7 +54,7 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         ConfigError, match=r"unknown key `images\.qqqq`: see config/README\.md"
     ) as e:
         settings.check_keys({"images": {"qqqq": 1}}, SCHEMA)
-    assert str(e.value).endswith("Known here: blur, grey")
+    assert str(e.value).endswith("Known here: blur, degree, grey")
 
 
 def test_known_keys_pass_whatever_their_values():

@@ -22,6 +22,7 @@ from addvc.analysis.strut_frame import (
     save_frame,
     stations,
     strut_frame,
+    widening,
 )
 from addvc.analysis.strut_table import RAW, Measured
 from addvc.fem.frame import Frame, FrameMotion, at_rest, energies, forces, moduli, skew, strains
@@ -439,6 +440,21 @@ def test_no_piece_is_short(length):
     loop = Branch(branch.points, (0, 0))
     assert len(linked(loop, np.array([], int))) == 0
     assert len(linked(Branch(branch.points, (0, FREE_END)), np.arange(2, 5))) == 3
+
+
+@pytest.mark.parametrize("inner", [0.5, 2.0, 3.5])
+def test_pieces_at_junctions_bend_as_the_profile_of_struts_says(inner):
+    """The area that bends as much as the profile over the piece, from that where the piece begins;
+    towards a free end there is no junction that would need it."""
+    line = np.array([0.0, inner, 5.0, 10 - inner, 10.0])
+    both = widening(Branch(np.zeros((2, 3)), (0, 1)), line)
+    x = np.linspace(0, inner, 5000) / 10 - 0.5
+    profile = 1 + x**2 + 36 * x**4
+    assert both[0] * profile[-1] == pytest.approx(np.mean(profile**-2.0) ** -0.5, rel=0.02)
+    assert_allclose(both, both[::-1])
+    assert_allclose(both[1:-1], 1)
+    assert_allclose(widening(Branch(np.zeros((2, 3)), (FREE_END, 1)), line)[:-1], 1)
+    assert_allclose(widening(Branch(np.zeros((2, 3)), (0, 1)), 7 * line), both)
 
 
 def test_junctions_do_not_meet():

@@ -6,19 +6,20 @@ from addvc.correlation.micro import micro_reference
 from addvc.fem.io import read_mesh, read_vtu
 from addvc.fem.mesh import Mesh
 from addvc.images.files import write_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, names = snakemake.input, snakemake.params.meso
     points, cells, classes, _ = read_vtu(source.mesh)
     nodes = points[classes["penalised"] == 0]
-    reference = micro_reference(Mesh(points, cells), load_volume(source.reference)[0])
+    grey, degree = load_coefficients(source.reference)
+    reference = micro_reference(Mesh(points, cells), grey, degree=degree)
     meshes = {name: read_mesh(path) for name, path in zip(names, source.meso, strict=True)}
     best = projections(reference, nodes, meshes)
     truth = load_truth(source.truth)
     found = [
-        difficulty(truth, reference, load_volume(path)[0], state, nodes, best)
+        difficulty(truth, reference, load_coefficients(path)[0], state, nodes, best)
         for state, path in zip(snakemake.params.states, source.deformed, strict=True)
     ]
     write_json(snakemake.output[0], {"states": found})

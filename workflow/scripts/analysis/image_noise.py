@@ -2,7 +2,7 @@
 
 from addvc.analysis.image_noise import pair_noise
 from addvc.images.files import read_json, write_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.images.specimen import Specimen
 from addvc.runtime import job
 
@@ -10,9 +10,9 @@ with job(snakemake) as log:
     source = snakemake.input
     specimen = Specimen.from_dict(read_json(source.specimen))
     gamma = read_json(source.threshold)["threshold"]
-    reference = load_volume(source.reference)[0]
+    reference, degree = load_coefficients(source.reference)
     noise = {
-        state: pair_noise(reference, load_volume(path)[0], specimen, gamma)
+        state: pair_noise(reference, load_coefficients(path)[0], specimen, gamma, degree)
         for state, path in zip(snakemake.params.states, source.deformed, strict=True)
     }
     log.info("residual of noise alone, grey levels: %s", noise)

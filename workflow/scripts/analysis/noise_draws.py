@@ -6,14 +6,14 @@ from addvc.correlation.uncertainty import Noise, fields_of_noise
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params
-    grey = load_volume(source.reference)[0]
+    grey, degree = load_coefficients(source.reference)
     shell = shell_of(params.method, load_quadrature(source.shell))
-    reference = micro_reference(read_mesh(source.mesh), grey, shell)
+    reference = micro_reference(read_mesh(source.mesh), grey, shell, degree)
     system = system_at_rest(reference, params.method, params.nu, source.factor, source.solution)
     noise = Noise(read_json(source.threshold)["noise"], params.blur)
     draws = fields_of_noise(system, grey.shape, noise)

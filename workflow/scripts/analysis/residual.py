@@ -6,14 +6,15 @@ from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import write_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake) as log:
     source, made = snakemake.input, snakemake.output
-    grey = load_volume(source.reference)[0]
-    reference = micro_reference(read_mesh(source.mesh), grey, load_quadrature(source.shell))
-    deformed = load_volume(source.deformed)[0]
+    grey, degree = load_coefficients(source.reference)
+    shell = load_quadrature(source.shell)
+    reference = micro_reference(read_mesh(source.mesh), grey, shell, degree)
+    deformed = load_coefficients(source.deformed)[0]
     for field, arrays, statistics in zip(source.fields, made.arrays, made.statistics, strict=True):
         result = residual_on(reference, deformed, load_field(field))
         log.info("%s: %s", field, result["statistics"])

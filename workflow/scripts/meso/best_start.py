@@ -8,15 +8,16 @@ from addvc.correlation.store import load_field, save_solution
 from addvc.correlation.transfer import lattice_matrix
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params
     mesh = read_mesh(source.mesh)
     size = read_json(source.figures)["mean_edge"]
-    options = meso_options(params.meso, size, params.axis, coarsest=True)
-    system = meso_system(mesh, load_volume(source.reference)[0], options)
+    reference, degree = load_coefficients(source.reference)
+    options = meso_options(params.meso, size, params.axis, coarsest=True, degree=degree)
+    system = meso_system(mesh, reference, options)
     starts = {name: candidate(name, source, params.axis)(mesh.points) for name in params.names}
     if "zero" in params.candidates:
         starts["zero"] = load_field(source.zero)
@@ -24,6 +25,6 @@ with job(snakemake) as log:
         lines = [np.array(line) for line in read_json(source.lines)["lines"]]
         into = lattice_matrix(lines, read_mesh(source.grid), mesh.points)
         starts["platens"] = into @ load_field(source.platens)
-    best, solution, table = scaled_start(system, load_volume(source.deformed)[0], starts)
+    best, solution, table = scaled_start(system, load_coefficients(source.deformed)[0], starts)
     log.info("best start: %s", best)
     save_solution(snakemake.output[0], solution, best=best, candidates=table)

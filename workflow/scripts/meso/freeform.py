@@ -5,14 +5,14 @@ from dataclasses import asdict, replace
 from addvc.correlation.freeform import freeform, freeform_options
 from addvc.correlation.store import save_solution
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params
     cell = read_json(source.cell_size)["cell_size"]
-    options = freeform_options(params.freeform, cell, params.axis)
-    images = (load_volume(path)[0] for path in (source.reference, source.deformed))
-    grid, solution, levels = freeform(*images, options)
+    reference, degree = load_coefficients(source.reference)
+    options = freeform_options(params.freeform, cell, params.axis, degree)
+    grid, solution, levels = freeform(reference, load_coefficients(source.deformed)[0], options)
     flat = replace(solution, u=solution.u.reshape(-1, 3))
     save_solution(snakemake.output[0], flat, grid=asdict(grid), levels=levels)

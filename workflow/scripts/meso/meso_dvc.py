@@ -5,19 +5,20 @@ from addvc.correlation.meso import meso_dvc, meso_options
 from addvc.correlation.store import load_notes, save_solution
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params
-    images = [load_volume(path)[0] for path in (source.reference, source.deformed)]
+    reference, degree = load_coefficients(source.reference)
+    images = [reference, load_coefficients(source.deformed)[0]]
     others = {name: candidate(name, source, params.axis) for name in params.names}
     coarser = {load_notes(source.start)["best"]: mesh_field(source.meshes[0], source.start)}
     files = zip(params.meshes, source.meshes, source.figures, snakemake.output, strict=True)
     for name, path, figures, output in files:
         coarsest = name == params.meshes[0]
         size = read_json(figures)["mean_edge"]
-        options = meso_options(params.meso, size, params.axis, coarsest)
+        options = meso_options(params.meso, size, params.axis, coarsest, degree)
         fields = coarser if coarsest else coarser | others
         solution, notes = meso_dvc(read_mesh(path), images, options, fields, name)
         save_solution(output, solution, **notes)

@@ -7,7 +7,7 @@ from addvc.correlation.store import save_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.levels import pyramid
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
@@ -15,10 +15,8 @@ with job(snakemake):
     mesh = read_mesh(source.mesh)
     grid = snakemake.wildcards.candidate == "platens"
     lines = [np.array(line) for line in read_json(source.lines)["lines"]] if grid else None
-    images = [
-        pyramid(load_volume(path)[0], params.meso["pyramid_levels"])
-        for path in (source.reference, source.deformed)
-    ]
+    splines = [load_coefficients(path) for path in (source.reference, source.deformed)]
+    images = [pyramid(grey, params.meso["pyramid_levels"]) for grey, _ in splines]
     size = read_json(source.figures)["mean_edge"]
-    options = start_options(params.meso, size, params.axis)
+    options = start_options(params.meso, size, params.axis, splines[0][1])
     save_field(snakemake.output[0], pyramid_start(mesh, *images, options, lines))

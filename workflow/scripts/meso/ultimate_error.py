@@ -5,14 +5,14 @@ from addvc.correlation.ultimate import STOP, ultimate_error
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json, write_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params
     size = read_json(source.figures)["mean_edge"]
-    options = meso_options(params.meso, size, params.axis, params.coarsest)
-    coefficients = load_volume(source.reference)[0]
+    coefficients, degree = load_coefficients(source.reference)
+    options = meso_options(params.meso, size, params.axis, params.coarsest, degree)
     system = meso_system(read_mesh(source.mesh), coefficients, options)
     shifts = params.ultimate_error["shifts"]
     noise = Noise(read_json(source.threshold)["noise"], params.images["blur"])

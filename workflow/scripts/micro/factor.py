@@ -7,7 +7,7 @@ from addvc.fem.mesh import Mesh
 from addvc.fem.shell import load_quadrature
 from addvc.fem.solver import factorise
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake) as log:
@@ -16,7 +16,8 @@ with job(snakemake) as log:
     cell = read_json(source.cell_size)["cell_size"]
     options = micro_options(params.micro, cell, params.axis)
     shell = shell_of(params.method, load_quadrature(source.shell))
-    reference = micro_reference(Mesh(points, cells), load_volume(source.reference)[0], shell)
+    grey, degree = load_coefficients(source.reference)
+    reference = micro_reference(Mesh(points, cells), grey, shell, degree)
     if params.method == "eq10":
         matrix, extra, weights = eq10(reference, classes["penalised"] > 0, options)
     else:

@@ -7,14 +7,15 @@ from addvc.correlation.store import load_factor, load_field, load_order, save_so
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, method, micro = snakemake.input, snakemake.params.method, snakemake.params.micro
     shell = shell_of(method, load_quadrature(source.shell))
-    reference = micro_reference(read_mesh(source.mesh), load_volume(source.reference)[0], shell)
-    deformed, start = load_volume(source.deformed)[0], load_field(source.start)
+    grey, degree = load_coefficients(source.reference)
+    reference = micro_reference(read_mesh(source.mesh), grey, shell, degree)
+    deformed, start = load_coefficients(source.deformed)[0], load_field(source.start)
     if method == "eq10":
         factor, extra, notes = load_factor(source.factor)
         stop = Stop(micro["tolerance"], micro["max_iterations"])

@@ -5,7 +5,7 @@ from addvc.correlation.micro_start import best_candidate, judge
 from addvc.correlation.store import load_field, save_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake) as log:
@@ -13,9 +13,10 @@ with job(snakemake) as log:
     cell = read_json(source.cell_size)["cell_size"]
     options = micro_options(params.micro, cell, params.axis)
     scale = robust_scale(params.micro["robust"], read_json(source.threshold))
-    reference = micro_reference(read_mesh(source.mesh), load_volume(source.reference)[0])
+    grey, degree = load_coefficients(source.reference)
+    reference = micro_reference(read_mesh(source.mesh), grey, degree=degree)
     starts = dict(zip(params.names, map(load_field, source.candidates), strict=True))
-    deformed = load_volume(source.deformed)[0]
+    deformed = load_coefficients(source.deformed)[0]
     best, table = best_candidate(judge(reference, options, scale), deformed, starts)
     for row in table:
         log.info("%s", row)

@@ -6,14 +6,14 @@ from addvc.correlation.uncertainty import Noise
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json, write_json
-from addvc.images.scans_store import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params
-    coefficients = load_volume(source.reference)[0]
+    coefficients, degree = load_coefficients(source.reference)
     shell = shell_of(params.method, load_quadrature(source.shell))
-    reference = micro_reference(read_mesh(source.mesh), coefficients, shell)
+    reference = micro_reference(read_mesh(source.mesh), coefficients, shell, degree)
     given = source.factor, source.get("solution")
     system = system_at_rest(reference, params.method, params.nu, *given)
     noise = Noise(read_json(source.threshold)["noise"], params.images["blur"])

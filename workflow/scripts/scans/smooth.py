@@ -6,14 +6,14 @@ from addvc.images.spline import gaussian_blur
 from addvc.runtime import job
 
 with job(snakemake):
-    source, axis, sigma = snakemake.input, snakemake.params.axis, snakemake.params.images["blur"]
+    source, axis, images = snakemake.input, snakemake.params.axis, snakemake.params.images
     volume, notes = load_volume(source.volume)
     if source.get("reference"):
         wanted = grey_levels(load_volume(source.reference)[0], axis)
         volume = matched(volume, grey_levels(volume, axis), wanted)
     save_volume(
         snakemake.output[0],
-        gaussian_blur(volume, sigma),
+        gaussian_blur(volume, images["blur"]),
         notes["voxel_size_um"],
-        {"bin": notes["bin"], "blur": sigma},
+        {"bin": notes["bin"], "blur": images["blur"], "degree": images["degree"]},
     )

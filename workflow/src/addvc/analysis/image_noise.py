@@ -9,7 +9,7 @@ import numpy as np
 
 from addvc.geometry.threshold import far_void, robust_deviation, specimen_mask
 from addvc.images.specimen import Specimen
-from addvc.images.spline import spline_value
+from addvc.images.spline import DEGREE, spline_value
 
 SEED = 2417
 LEAST = 0.01
@@ -20,7 +20,11 @@ MOST = 2_000_000
 
 
 def pair_noise(
-    reference: np.ndarray, deformed: np.ndarray, specimen: Specimen, gamma: float
+    reference: np.ndarray,
+    deformed: np.ndarray,
+    specimen: Specimen,
+    gamma: float,
+    degree: int = DEGREE,
 ) -> float | None:
     """Standard deviation of I_r(x) - I_d(x + u), grey levels, that noise alone leaves; None where too
     little of the specimen is void in both blurred images (nx, ny, nz).
@@ -34,7 +38,7 @@ def pair_noise(
     void = void[:: -(-len(void) // MOST)]
     centres, rng = np.stack(np.unravel_index(void, mask.shape), axis=1), np.random.default_rng(SEED)
     here, there = (
-        spline_value(image, centres + rng.uniform(-0.5, 0.5, centres.shape))
+        spline_value(image, centres + rng.uniform(-0.5, 0.5, centres.shape), degree)
         for image in (reference, deformed)
     )
     r = (here[0] - there[0])[here[1] & there[1]]

@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from addvc.fem.frame import Frame
-from addvc.geometry.centre_line import Curve
+from addvc.geometry.centre_line import Curve, arc_length
 from addvc.geometry.region import Region
 from addvc.geometry.sections import CUT, Solid, cut_depth, grey_struts, mean_radius, sections_of
 from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
@@ -99,7 +99,8 @@ def assembled(
         points.append(curve(s))
         pieces.append(chain)
         at = middles(branch, s) if len(s) else np.full(len(chain), curve.middle)
-        area.append(sections_of(curve, at, solid.voxels[own], solid.share[own]))
+        wider = widening(branch, along_strut(branch, curve(s), junctions))
+        area.append(wider * sections_of(curve, at, solid.voxels[own], solid.share[own]))
         count += len(s)
     frame = Frame(*(np.concatenate(part) for part in (points, pieces, area)))
     strut = np.repeat(np.arange(len(pieces)), [len(part) for part in pieces])
@@ -119,6 +120,30 @@ def middles(branch: Branch, s: np.ndarray) -> np.ndarray:
     """Arc lengths (m,) of the pieces between nodes at s (g,); of those to junctions, their nodes."""
     first, second = (int(end != FREE_END) for end in branch.ends)
     return np.concatenate([s[:first], (s[1:] + s[:-1]) / 2, s[len(s) - second :]])
+
+
+def along_strut(branch: Branch, inner: np.ndarray, junctions: np.ndarray) -> np.ndarray:
+    """Arc lengths (m + 1,) of the ends of the pieces (m,) of a strut with nodes (g, 3)."""
+    first, second = (junctions[[end] if end != FREE_END else []] for end in branch.ends)
+    return arc_length(np.concatenate([first, inner, second]))
+
+
+def widening(branch: Branch, ends: np.ndarray) -> np.ndarray:
+    """Area of each piece (m,) over that measured for it: of a piece that leads to a junction that is the
+    area at its other end, beyond which the solid is that of several struts.
+
+    There the profile of the struts of polyurethane foams goes on, a = 1 + x^2 + 36 x^4 over that of
+    the middle, x from -1/2 to 1/2 [Gong2005], of which the piece has the section that bends as much:
+    a^-2 is the mean. On the default twin, whose struts have another profile, such pieces have .82 of
+    the true area without it and 1.14 with it."""
+    wider = np.ones(len(ends) - 1)
+    for end, piece, inner in ((0, 0, 1), (1, -1, -2)):
+        if branch.ends[end] == FREE_END or len(wider) < 2:
+            continue
+        x = np.linspace(ends[inner], ends[piece], 21) / ends[-1] - 0.5
+        area = 1 + x**2 + 36 * x**4
+        wider[piece] = np.mean(area**-2.0) ** -0.5 / area[0]
+    return wider
 
 
 def stations(branch: Branch, curve: Curve, junctions: np.ndarray, piece: float) -> np.ndarray:

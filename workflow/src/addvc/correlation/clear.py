@@ -7,7 +7,7 @@ meet other struts and pull the wrong way.
 import numpy as np
 
 from addvc.errors import CorrelationError
-from addvc.images.spline import gradient_length
+from addvc.images.spline import DEGREE, gradient_length
 
 MAXWELL_MEDIAN = 1.538  # median length of a vector of three normal deviates of variance one
 STRONG = 99  # percentile of the gradients that stands for those of the structure
@@ -15,7 +15,9 @@ CLEARLY = 0.25  # of that is enough, however noisy
 BLANK = 1e-5  # of the grey level: less is round-off
 
 
-def clear_voxels(coefficients: np.ndarray, stride: int, clear: float) -> np.ndarray:
+def clear_voxels(
+    coefficients: np.ndarray, stride: int, clear: float, degree: int = DEGREE
+) -> np.ndarray:
     """Whether the gradient exceeds `clear` times the noise: bool, at every `stride`-th voxel centre
     from stride // 2 on along each axis.
 
@@ -23,7 +25,7 @@ def clear_voxels(coefficients: np.ndarray, stride: int, clear: float) -> np.ndar
     is enough: in a texture, which has no void, most voxels take part. Raises CorrelationError for a
     blank image."""
     kept = (slice(stride // 2, None, stride),) * 3
-    length = gradient_length(coefficients)[kept]
+    length = gradient_length(coefficients, degree)[kept]
     noise, strong = np.median(length) / MAXWELL_MEDIAN, np.percentile(length, STRONG)
     if strong <= BLANK * np.abs(coefficients).max():
         raise CorrelationError(
@@ -33,10 +35,12 @@ def clear_voxels(coefficients: np.ndarray, stride: int, clear: float) -> np.ndar
     return length > min(clear * noise, CLEARLY * strong)
 
 
-def clear_points(coefficients: np.ndarray, stride: int, clear: float) -> np.ndarray:
+def clear_points(
+    coefficients: np.ndarray, stride: int, clear: float, degree: int = DEGREE
+) -> np.ndarray:
     """The centres of these voxels (Q, 3)."""
     lines = lattice(coefficients.shape, stride)
-    index = np.nonzero(clear_voxels(coefficients, stride, clear))
+    index = np.nonzero(clear_voxels(coefficients, stride, clear, degree))
     return np.column_stack([line[i] for line, i in zip(lines, index, strict=True)])
 
 

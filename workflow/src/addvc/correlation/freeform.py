@@ -31,7 +31,7 @@ from addvc.correlation.spline_stencil import (
     stencil_product,
 )
 from addvc.images.platens import find_platens
-from addvc.images.spline import gaussian_blur
+from addvc.images.spline import DEGREE, gaussian_blur
 
 log = logging.getLogger(__name__)
 
@@ -69,21 +69,25 @@ LEVELS = (
 @dataclass(frozen=True)
 class FreeformOptions:
     """Loading axis; levels from coarse to fine; the rms(du) in voxels below which the last level has
-    settled: a start needs no more."""
+    settled: a start needs no more; degree of the splines of the images (those of u are cubic)."""
 
     axis: int
     levels: tuple[Level, ...] = LEVELS
     settled: float = 0.1
+    degree: int = DEGREE
 
 
-def freeform_options(section: dict, cell_size: float, axis: int) -> FreeformOptions:
+def freeform_options(
+    section: dict, cell_size: float, axis: int, degree: int = DEGREE
+) -> FreeformOptions:
     """LEVELS scaled to the finest spacing of the `freeform` section: auto is 8 for cells of 28.
 
     The last level is not thinned out, whatever the cell size."""
     nominal = LEVELS[-1].spacing
     auto = nominal * cell_size / NOMINAL_CELL
     scale = (auto if section["spacing"] == "auto" else section["spacing"]) / nominal
-    return FreeformOptions(axis, tuple(scaled(level, scale) for level in LEVELS))
+    levels = tuple(scaled(level, scale) for level in LEVELS)
+    return FreeformOptions(axis, levels, degree=degree)
 
 
 def scaled(level: Level, scale: float) -> Level:
@@ -158,7 +162,8 @@ def freeform(
     for level in options.levels:
         while grid.spacing > 1.01 * level.spacing:
             grid, u = grid.finer(), refine(u)
-        sampling = sample(grid, gaussian_blur(reference, level.blur), level.stride, level.clear)
+        blurred = gaussian_blur(reference, level.blur)
+        sampling = sample(grid, blurred, level.stride, level.clear, options.degree)
         blurred = gaussian_blur(deformed, level.blur)
         solution = register_level(sampling, blurred, u, level, options)
         u, history = solution.u, history + solution.history

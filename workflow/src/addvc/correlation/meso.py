@@ -32,6 +32,7 @@ from addvc.fem.operators import laplacian, vectorised
 from addvc.fem.quadrature import Quadrature, lattice_points, voxel_points
 from addvc.fem.solver import solver
 from addvc.images.levels import displacement_to_coarse, displacement_to_fine, to_coarse
+from addvc.images.spline import DEGREE
 
 log = logging.getLogger(__name__)
 
@@ -43,16 +44,19 @@ START_VOXELS = 2e6  # a start is coarse: more voxels would take memory and give 
 @dataclass(frozen=True)
 class MesoOptions:
     """Lengths in voxels: cut-off l_L of Eq. 9 (0 for none) and period T of its trial wave; only voxels
-    take part whose gradient exceeds `clear` times the noise (0: all)."""
+    take part whose gradient exceeds `clear` times the noise (0: all); degree of the splines."""
 
     axis: int
     cutoff: float
     period: float
     stop: Stop = field(default_factory=Stop)
     clear: float = 0.0
+    degree: int = DEGREE
 
 
-def meso_options(section: dict, size: float, axis: int, coarsest: bool) -> MesoOptions:
+def meso_options(
+    section: dict, size: float, axis: int, coarsest: bool, degree: int = DEGREE
+) -> MesoOptions:
     """Options of one mesh of mean edge `size` from the `meso` section of a configuration.
 
     The coarsest mesh is regularised by its elements alone. The paper's cut-off of some 35 voxels
@@ -60,19 +64,22 @@ def meso_options(section: dict, size: float, axis: int, coarsest: bool) -> MesoO
     0.6 of the edge keeps the system regular and falls from mesh to mesh."""
     cutoff = 0.6 * size if section["l_l"] == "auto" else float(section["l_l"])
     stop = Stop(section["tolerance"], section["max_iterations"])
-    return MesoOptions(axis, 0.0 if coarsest else cutoff, 4 * size, stop, section["clear"])
+    return MesoOptions(axis, 0.0 if coarsest else cutoff, 4 * size, stop, section["clear"], degree)
 
 
-def start_options(section: dict, size: float, axis: int) -> MesoOptions:
+def start_options(section: dict, size: float, axis: int, degree: int = DEGREE) -> MesoOptions:
     """Options of the pyramid: a loose criterion, and a Laplacian of one element on every level."""
-    return MesoOptions(axis, size, 4 * size, Stop(1e-2, section["max_iterations"]))
+    stop = Stop(1e-2, section["max_iterations"])
+    return MesoOptions(axis, size, 4 * size, stop, degree=degree)
 
 
 def meso_quadrature(
-    mesh: Mesh, coefficients: np.ndarray, clear: float, most: float = np.inf
+    mesh: Mesh, coefficients: np.ndarray, options: MesoOptions, most: float = np.inf
 ) -> Quadrature:
     """A point of each voxel in tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
-    chosen = clear_voxels(coefficients, 1, clear) if clear > 0 else None
+    chosen = None
+    if options.clear > 0:
+        chosen = clear_voxels(coefficients, 1, options.clear, options.degree)
     stride = thinning(coefficients.size, most)
     return voxel_points(mesh, coefficients.shape, stride, chosen, dithered=True)
 
@@ -93,11 +100,11 @@ def meso_system(
 
     `lines` are the grid lines of a hexahedral grid."""
     if lines is None:
-        quadrature = meso_quadrature(mesh, coefficients, options.clear, most)
+        quadrature = meso_quadrature(mesh, coefficients, options, most)
     else:
         stride = thinning(coefficients.size, most)
         quadrature = lattice_points(lines, coefficients.shape, stride)
-    reference = reference_on(mesh, quadrature, coefficients)
+    reference = reference_on(mesh, quadrature, coefficients, options.degree)
     h = hessian(reference, node_pattern(mesh))
     if options.cutoff == 0:
         return System(reference, None, solver(h + held(mesh, h)))
@@ -131,9 +138,7 @@ def pyramid_start(
         factor = 2**level
         small = Mesh(to_coarse(mesh.points, factor), mesh.cells)
         grid = None if lines is None else [to_coarse(line, factor) for line in lines]
-        scaled = MesoOptions(
-            options.axis, options.cutoff / factor, options.period / factor, options.stop
-        )
+        scaled = replace(options, cutoff=options.cutoff / factor, period=options.period / factor)
         system = meso_system(small, references[level], scaled, grid, START_VOXELS)
         solution = register(
             system,

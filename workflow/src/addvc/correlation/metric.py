@@ -8,12 +8,13 @@ from scipy import sparse
 from addvc.fem.assembly import Pattern, block_matrix, scatter_dyads, scatter_vectors
 from addvc.fem.mesh import Mesh
 from addvc.fem.quadrature import Quadrature, interpolate
-from addvc.images.spline import spline_value, spline_value_gradient
+from addvc.images.spline import DEGREE, spline_value, spline_value_gradient
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """I_r on the quadrature of a mesh: grey levels (Q,), gradient (Q, 3) per voxel, inside (Q,).
+    """I_r on the quadrature of a mesh: grey levels (Q,), gradient (Q, 3) per voxel, inside (Q,);
+    degree of the splines, which is that of I_d too.
 
     Points outside of I_r itself have neither grey level nor gradient."""
 
@@ -22,12 +23,15 @@ class Reference:
     grey: np.ndarray
     gradient: np.ndarray
     inside: np.ndarray
+    degree: int = DEGREE
 
 
-def reference_on(mesh: Mesh, quadrature: Quadrature, coefficients: np.ndarray) -> Reference:
+def reference_on(
+    mesh: Mesh, quadrature: Quadrature, coefficients: np.ndarray, degree: int = DEGREE
+) -> Reference:
     """Sample the spline of I_r (Eq. 4) at the points of a quadrature."""
-    grey, gradient, inside = spline_value_gradient(coefficients, quadrature.points)
-    return Reference(mesh, quadrature, grey, gradient, inside)
+    grey, gradient, inside = spline_value_gradient(coefficients, quadrature.points, degree)
+    return Reference(mesh, quadrature, grey, gradient, inside, degree)
 
 
 def turned(reference: Reference, rotation: np.ndarray) -> Reference:
@@ -64,7 +68,7 @@ def residual_at(
     reference: Reference, deformed: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same for displacements u (Q, 3) given at the points themselves."""
-    grey, inside = spline_value(deformed, reference.quadrature.points + u)
+    grey, inside = spline_value(deformed, reference.quadrature.points + u, reference.degree)
     inside &= reference.inside
     return np.where(inside, reference.grey - grey, np.float32(0)), inside
 

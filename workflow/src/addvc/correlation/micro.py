@@ -25,6 +25,7 @@ from addvc.fem.mesh import Mesh
 from addvc.fem.operators import stiffness
 from addvc.fem.quadrature import Quadrature, gauss_points
 from addvc.fem.shell import joined
+from addvc.images.spline import DEGREE
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,11 @@ def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
 
 
 def micro_reference(
-    mesh: Mesh, coefficients: np.ndarray, shell: Quadrature | None = None
+    mesh: Mesh, coefficients: np.ndarray, shell: Quadrature | None = None, degree: int = DEGREE
 ) -> Reference:
     """I_r at the four Gauss points of each tetrahedron, then at the points of a shell."""
-    points = gauss_points(mesh)
-    return reference_on(mesh, points if shell is None else joined(points, shell), coefficients)
+    points = gauss_points(mesh) if shell is None else joined(gauss_points(mesh), shell)
+    return reference_on(mesh, points, coefficients, degree)
 
 
 def eq10(

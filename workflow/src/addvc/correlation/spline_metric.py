@@ -19,30 +19,34 @@ from addvc.correlation.spline_grid import (
     sum_basis,
 )
 from addvc.correlation.spline_stencil import scatter_dyads
-from addvc.images.spline import spline_value_gradient
+from addvc.images.spline import DEGREE, spline_value_gradient
 
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """I_r at the points of a grid: where they are on the grid, grey level, gradient, weight."""
+    """I_r at the points of a grid: where they are on the grid, grey level, gradient, weight; degree
+    of the splines of both images."""
 
     grid: SplineGrid
     points: SplinePoints
     grey: np.ndarray
     gradient: np.ndarray
     weight: np.ndarray
+    degree: int = DEGREE
 
     def displacement(self, coefficients: np.ndarray) -> np.ndarray:
         """u (Q, 3) at the points."""
         return sum_basis(coefficients, self.points.cell, self.points.basis)
 
 
-def sample(grid: SplineGrid, coefficients: np.ndarray, stride: int, clear: float) -> Sampling:
+def sample(
+    grid: SplineGrid, coefficients: np.ndarray, stride: int, clear: float, degree: int = DEGREE
+) -> Sampling:
     """The clear points of I_r, given by its spline coefficients (nx, ny, nz), on a grid."""
-    points = spline_points(grid, clear_points(coefficients, stride, clear))
-    grey, gradient, _ = spline_value_gradient(coefficients, points.points)
+    points = spline_points(grid, clear_points(coefficients, stride, clear, degree))
+    grey, gradient, _ = spline_value_gradient(coefficients, points.points, degree)
     weight = np.full(len(grey), float(stride**3))
-    return Sampling(grid, points, grey, gradient.astype(float), weight)
+    return Sampling(grid, points, grey, gradient.astype(float), weight, degree)
 
 
 def linearise(
@@ -51,7 +55,8 @@ def linearise(
     """Eq. 5 and its slope: r (Q,), the mean of both gradients (Q, 3), inside (Q,), at u (Q, 3).
 
     Points that have left I_d have neither."""
-    grey, gradient, inside = spline_value_gradient(deformed, sampling.points.points + u)
+    at = sampling.points.points + u
+    grey, gradient, inside = spline_value_gradient(deformed, at, sampling.degree)
     r = np.where(inside, sampling.grey - grey, 0.0).astype(float)
     mean = (sampling.gradient + gradient) / 2
     return r, np.where(inside[:, None], mean, 0.0), inside

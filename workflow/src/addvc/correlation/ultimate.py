@@ -74,9 +74,9 @@ def ultimate_error(
 def with_noise(system: System, coefficients: np.ndarray, noise: Noise, rows: list[dict]) -> dict:
     """The standard deviation found with noise, and the two that were to be expected: of noise as the
     images have it, and of white noise of the same deviation at the points. All in voxels."""
-    points = system.reference.quadrature.points
+    reference = system.reference
     field = noise.volume(coefficients.shape, np.random.default_rng(SEED))
-    sigma = float(spline_value(field, points)[0].std())
+    sigma = float(spline_value(field, reference.quadrature.points, reference.degree)[0].std())
     expected = a_priori(system, coefficients.shape, noise)
     white = a_priori_white(system, sigma)
     return {

@@ -58,8 +58,9 @@ def of_two_images(
     system: System, shape: tuple[int, int, int], noise: Noise
 ) -> Callable[[], np.ndarray]:
     """Draws of the residual (Q,) that the noise of two images of `shape` makes (grey levels)."""
-    rng, points = np.random.default_rng(SEED), system.reference.quadrature.points
-    return lambda: np.sqrt(2) * spline_value(noise.volume(shape, rng), points)[0]
+    rng, at = np.random.default_rng(SEED), system.reference
+    points, degree = at.quadrature.points, at.degree
+    return lambda: np.sqrt(2) * spline_value(noise.volume(shape, rng), points, degree)[0]
 
 
 def fields_of_noise(

@@ -35,3 +35,9 @@ def load_volume(path: str | os.PathLike) -> tuple[NDArray[np.float32], dict]:
             for key, value in dataset.attrs.items()
         }
         return dataset[...].astype(np.float32, copy=False), attrs
+
+
+def load_coefficients(path: str | os.PathLike) -> tuple[NDArray[np.float32], int]:
+    """A blurred volume as a spline (Eq. 4): its coefficients (nx, ny, nz) and the degree."""
+    coefficients, attrs = load_volume(path)
+    return coefficients, attrs["degree"]

@@ -125,7 +125,7 @@ def _column(case: Case, name: str, config: dict, methods: dict[str, str]) -> dic
         "Elements": str(facts["cells"]),
         "Mesh geometry": "Fig. 8" if micro else "Fig. 5",
         "Image definition (voxels)": times(image),
-        "Sub-voxel evaluation": "cubic B-spline (Eq. 4)",
+        "Sub-voxel evaluation": f"B-spline (Eq. 4), p = {config['images']['degree']}",
         "Gaussian pre-filter, standard deviation (voxels, Eq. 8)": f"{config['images']['blur']:g}",
     }
     edge = {"Mean element length (voxels)": f"{facts['mean_edge']:.2f}"}
