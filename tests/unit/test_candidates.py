@@ -6,19 +6,23 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from addvc.correlation import meso
 from addvc.correlation.candidates import candidate
 from addvc.correlation.clear import clear_voxels
-from addvc.correlation.gauss_newton import Solution
-from addvc.correlation.meso import MesoOptions, chosen_register, meso_dvc, meso_system
+from addvc.correlation.cutoff import Ladder
+from addvc.correlation.gauss_newton import Solution, rms
+from addvc.correlation.meso import MesoOptions, meso_dvc, meso_system
+from addvc.correlation.meso_start import chosen_register
 from addvc.correlation.register import Stop, register
 from addvc.correlation.spline_grid import grid_over
 from addvc.correlation.store import save_field, save_solution
 from addvc.correlation.ultimate import fft_shift
+from addvc.correlation.uncertainty import Noise
 from addvc.errors import CorrelationError
 from addvc.fem import solver
 from addvc.fem.io import write_mesh
 from addvc.images.scans_store import save_volume
-from addvc.images.spline import interpolating_coefficients
+from addvc.images.spline import interpolating_coefficients, spline_value
 
 AXIS = 1
 SLOPE = np.array([[0.01, 0.03, 0], [-0.02, -0.05, 0.01], [0, 0.02, 0.04]])
@@ -161,3 +165,47 @@ def test_meso_dvc_without_a_factor_finds_the_same(speckle, box, monkeypatch):
     iterative, notes = meso_dvc(mesh, [image, moved], options, rest, "meso")
     assert notes["best"] == "rest" and iterative.iterations == direct.iterations
     assert_allclose(iterative.u, direct.u, atol=1e-8)
+
+
+def waved(image, amplitude, sigma, seed):
+    """An image (n, n, n) moved by a wave of 20 voxels, with noise; and the wave at points (q, 3)."""
+
+    def wave(x):
+        return amplitude * np.sin(2 * np.pi * x[:, [1, 2, 0]] / 20)
+
+    x = np.argwhere(np.ones(image.shape, bool)).astype(float)
+    moved = spline_value(image, np.clip(x - wave(x - wave(x)), 0, 47), 3)[0]
+    noise = sigma * np.random.default_rng(seed).standard_normal(image.size)
+    return (moved + noise).reshape(image.shape).astype(np.float32), wave
+
+
+@pytest.mark.parametrize("amplitude, sigma, shorter", [(0.6, 1.0, True), (0.0, 40.0, False)])
+def test_the_cut_off_follows_the_motion_and_the_noise(speckle, box, amplitude, sigma, shorter):
+    """l_L falls where it hid a wave, rises where there is noise only; the error falls in both cases."""
+    still = interpolating_coefficients(speckle((48, 48, 48)))
+    image, _ = waved(still, 0.0, sigma, 2417)
+    deformed, wave = waved(still, amplitude, sigma, 6113)
+    mesh = box((6, 6, 6), (42, 42, 42), (8, 8, 8))
+    options = MesoOptions(AXIS, 6.0, 24.0, degree=3)
+    ladder = Ladder(Noise(sigma, 0.0), shortest=-2, draws=4)
+    found = {}
+    for name, given in (("as it is", None), ("chosen", ladder)):
+        rest = {"rest": np.zeros_like}
+        solution, notes = meso_dvc(mesh, [image, deformed], options, rest, "meso", given)
+        assert solution.converged
+        found[name] = notes["l_l"], rms(solution.u - wave(mesh.points))
+    assert (found["chosen"][0] < found["as it is"][0]) == shorter
+    assert found["chosen"][0] != found["as it is"][0] == options.cutoff
+    assert found["chosen"][1] < found["as it is"][1]
+
+
+def test_a_cut_off_from_which_the_loop_does_not_settle_is_dropped(speckle, box, monkeypatch):
+    still = interpolating_coefficients(speckle((48, 48, 48)))
+    deformed, _ = waved(still, 0.6, 0.0, 2417)
+    mesh, options = box((6, 6, 6), (42, 42, 42), (8, 8, 8)), MesoOptions(AXIS, 6.0, 24.0)
+    monkeypatch.setattr(meso, "ONCE_MORE", 1)
+    start, ladder = {"rest": np.zeros_like}, Ladder(Noise(1.0, 0.0), shortest=-2)
+    plain, _ = meso_dvc(mesh, [still, deformed], options, start, "meso")
+    chosen, notes = meso_dvc(mesh, [still, deformed], options, start, "meso", ladder)
+    assert len(notes["risk"]) > 1 and notes["l_l"] == options.cutoff
+    assert_array_equal(chosen.u, plain.u)

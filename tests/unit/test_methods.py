@@ -27,8 +27,9 @@ def state(number, converged=True, error=None, weight=1e4):
         "error": error,
     }
     struts = {"valid": 340, "bending_share": 0.7 + 0.05 * number}
-    return {"label": f"{number} %", "micro": found, "struts": struts, "cells": {"bands": 1},
-            "uncertainty": {"rms": 0.05 + 0.01 * number}, "equilibrium": {"weight": weight}}  # fmt: skip
+    return {"label": f"{number} %", "micro": found, "meso12": {"l_l": 3.7 * number},
+            "struts": struts, "cells": {"bands": 1}, "equilibrium": {"weight": weight},
+            "uncertainty": {"rms": 0.05 + 0.01 * number}}  # fmt: skip
 
 
 def summary(*states):
@@ -52,7 +53,8 @@ def test_the_numbers_are_those_of_the_summary():
     for words in ("commit ab12", "(3, of 120 x 140 x 120 voxels of 6.67 micrometres, binned by 3",
                   "is 28.8 voxels", "239573 tetrahedra", "12.3 and 12.3 voxels", "4.7e-04 voxel",
                   "2.00 to 3.00 grey levels", "75 to 80 %", "0.076 to 0.113 voxel",
-                  "as that of corotational did in every state"):  # fmt: skip
+                  "as that of corotational did in every state",
+                  "a Laplacian below 3.7 to 7.4 voxels, the length of least unbiased risk"):  # fmt: skip
         assert words in text
     assert "which that of corotational did not at 2 %" in told(
         config(), state(1), state(2, converged=False)

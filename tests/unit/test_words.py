@@ -45,6 +45,7 @@ def found(converged=True, valid=1.0, error=ERROR):
         "residual_mean": -0.5,
         "valid_nodes": valid,
         "l_e": 23.0,
+        "l_l": None,
         "seconds": 0.3,
         "error": error,
     }

@@ -5,12 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from addvc.correlation.gauss_newton import rms
-from addvc.correlation.meso import (
-    MesoOptions,
-    meso_system,
-    pyramid_start,
-    rescale,
-)
+from addvc.correlation.meso import MesoOptions, meso_system, pyramid_start
+from addvc.correlation.meso_start import rescale
 from addvc.correlation.metric import (
     hessian,
     reference_on,

@@ -109,6 +109,7 @@ rule meso_dvc:
         meshes=expand(f"{R}/geometry/{{mesh}}.vtu", mesh=MESO),
         figures=expand(f"{R}/geometry/{{mesh}}.json", mesh=MESO),
         start=f"{R}/dvc/start_state{{state}}.h5",
+        threshold=f"{R}/geometry/threshold.json",
     output:
         of_state("dvc/{mesh}_state{state}.h5", MESO),
     log:
@@ -124,6 +125,7 @@ rule meso_dvc:
     params:
         code=code("meso/meso_dvc.py"),
         meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
+        blur=config["images"]["blur"],
         meshes=MESO,
         names=fields_of,
         axis=AXIS,
@@ -133,6 +135,7 @@ rule meso_dvc:
 
 rule meso_ultimate_error:
     input:
+        **({"solution": f"{R}/dvc/{{meso}}_state{STATES[0]}.h5"} if STATES else {}),
         reference=f"{R}/volumes/smooth0.h5",
         threshold=f"{R}/geometry/threshold.json",
         mesh=f"{R}/geometry/{{meso}}.vtu",

@@ -3,7 +3,8 @@
 import numpy as np
 
 from addvc.correlation.candidates import candidate
-from addvc.correlation.meso import meso_options, meso_system, scaled_start
+from addvc.correlation.meso import meso_options, meso_system
+from addvc.correlation.meso_start import scaled_start
 from addvc.correlation.store import load_field, save_solution
 from addvc.correlation.transfer import lattice_matrix
 from addvc.fem.io import read_mesh
@@ -11,7 +12,7 @@ from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
 from addvc.runtime import job
 
-with job(snakemake) as log:
+with job(snakemake):
     source, params = snakemake.input, snakemake.params
     mesh = read_mesh(source.mesh)
     size = read_json(source.figures)["mean_edge"]
@@ -26,5 +27,4 @@ with job(snakemake) as log:
         into = lattice_matrix(lines, read_mesh(source.grid), mesh.points)
         starts["platens"] = into @ load_field(source.platens)
     best, solution, table = scaled_start(system, load_coefficients(source.deformed)[0], starts)
-    log.info("best start: %s", best)
     save_solution(snakemake.output[0], solution, best=best, candidates=table)

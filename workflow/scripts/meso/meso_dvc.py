@@ -1,7 +1,7 @@
 """Eq. 9: meso DVC on each mesh, coarse to fine, from the coarser one or the best start beside it."""
 
 from addvc.correlation.candidates import candidate, mesh_field
-from addvc.correlation.meso import meso_dvc, meso_options
+from addvc.correlation.meso import cutoff_ladder, meso_dvc, meso_options
 from addvc.correlation.store import load_notes, save_solution
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
@@ -12,6 +12,7 @@ with job(snakemake):
     source, params = snakemake.input, snakemake.params
     reference, degree = load_coefficients(source.reference)
     images = [reference, load_coefficients(source.deformed)[0]]
+    ladder = cutoff_ladder(params.meso, read_json(source.threshold), params.blur)
     others = {name: candidate(name, source, params.axis) for name in params.names}
     coarser = {load_notes(source.start)["best"]: mesh_field(source.meshes[0], source.start)}
     files = zip(params.meshes, source.meshes, source.figures, snakemake.output, strict=True)
@@ -20,6 +21,6 @@ with job(snakemake):
         size = read_json(figures)["mean_edge"]
         options = meso_options(params.meso, size, params.axis, coarsest, degree)
         fields = coarser if coarsest else coarser | others
-        solution, notes = meso_dvc(read_mesh(path), images, options, fields, name)
+        solution, notes = meso_dvc(read_mesh(path), images, options, fields, name, ladder)
         save_solution(output, solution, **notes)
         coarser = {name: mesh_field(path, output)}

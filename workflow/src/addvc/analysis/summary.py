@@ -125,6 +125,7 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
     return {
         "start": notes.get("best"),
         "l_e": notes.get("l_e"),
+        "l_l": notes.get("l_l"),
         "converged": solution.converged,
         "iterations": solution.iterations,
         "last_step": solution.history[-1],

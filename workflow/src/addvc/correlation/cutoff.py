@@ -1,4 +1,4 @@
-"""The cut-off length l_E of micro DVC, chosen from the images: the least unbiased risk.
+"""The cut-off length l_E of micro DVC, l_L of meso DVC, chosen from the images: the least unbiased risk.
 
 A longer l_E keeps more of the noise out and lets less of the motion in. For u = A^-1 b, linear in the
 images, what it costs altogether is known without knowing the motion [Stein, Ann. Statist. 9, 1981]:
@@ -109,16 +109,16 @@ def risk(trial: Trial, times: float) -> dict:
 
 
 def solver(trial: Trial, factor: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Solves (H + factor M) x = b: conjugate gradients, preconditioned by the factor of H + M."""
+    """Solves (H + factor M) x = b: conjugate gradients, preconditioned by what the system has."""
     matrix = (trial.hessian + factor * trial.system.regularisation).tocsr()
-    known = LinearOperator(matrix.shape, matvec=trial.system.factor.solve)
+    known = LinearOperator(matrix.shape, matvec=trial.system.factor.precondition)
 
     def solve(b: np.ndarray) -> np.ndarray:
         x, info = cg(matrix, b, M=known, rtol=PRECISE)
         if info:
             raise CorrelationError(
-                f"l_E cannot be chosen: {info} iterations did not solve for {factor:.2g} times the "
-                "elastic energy; set micro.l_e to a length (voxels)"
+                f"the cut-off cannot be chosen: {info} iterations did not solve for {factor:.2g} times "
+                "the regularisation; set micro.l_e or meso.l_l to a length (voxels)"
             )
         return x
 

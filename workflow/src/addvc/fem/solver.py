@@ -50,6 +50,10 @@ class Factor:
         )
         return x
 
+    def precondition(self, r: np.ndarray) -> np.ndarray:
+        """A^-1 r (N,), for a matrix that is near A."""
+        return self.solve(r)
+
 
 @nb.njit(cache=True)
 def triangular_solves(data, indices, indptr, b):

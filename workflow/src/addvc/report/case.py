@@ -104,9 +104,10 @@ class Case:
     def solution(self, mesh: str, state: int) -> Solution:
         return load_solution(self.path(f"dvc/{mesh}_state{state}.h5"))[0]
 
-    def cutoff(self, mesh: str, state: int) -> float:
-        """l_E (voxels) of a micro result of the default kind."""
-        return float(self.notes(mesh, state)["l_e"])
+    def cutoffs(self, mesh: str) -> list[float]:
+        """l_E of a micro result of the default kind, or l_L of a meso result, in each state (voxels)."""
+        key = "l_e" if mesh in self.micro else "l_l"
+        return [float(self.notes(mesh, state)[key]) for state in self.states]
 
     def notes(self, mesh: str, state: int) -> dict:
         """What was noted with a solution."""

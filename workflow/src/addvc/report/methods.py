@@ -70,12 +70,21 @@ def meso(summary: dict, config: dict) -> str:
     least, more = config["meso"]["clear"], set(config["meso"]["candidates"]) - {"zero", "platens"}
     clear = f", on the voxels whose gradient exceeds {least:g} times its noise" if least else ""
     fields = " or from one of these that is defined everywhere" if more else ""
+    used = [state[name]["l_l"] for state in summary["states"] for name in finer(summary)]
+    auto = config["meso"]["l_l"] == "auto"
+    chosen = ", the length of least unbiased risk {stein} in each state" if auto else ""
+    laplacian = f", with a Laplacian below {span(used, '.3g')} voxels{chosen}" if used else ""
     return (
         "Each loading state was registered with the reference by finite-element DVC {dvc} on "
         f"tetrahedra with a mean edge of {edges} voxels, coarse to fine{clear}, from the start of least "
         f"residual: {starts}, each rescaled in a reduced basis on the coarsest mesh {{addvc}}; finer "
-        f"meshes and micro DVC started from the coarser result{fields}."
+        f"meshes{laplacian}, and micro DVC started from the coarser result{fields}."
     )
+
+
+def finer(summary: dict) -> list[str]:
+    """The meso meshes but the coarsest."""
+    return [name for name in summary["meshes"] if not name.startswith("micro")][1:]
 
 
 def micro(summary: dict, config: dict) -> str:

@@ -46,13 +46,13 @@ def results_table(summary: dict) -> list[str]:
 
 
 def convergence_table(summary: dict) -> list[str]:
-    """Start, l_E, iterations and last step of every state and mesh."""
+    """Start, cut-off length, iterations and last step of every state and mesh."""
     rows = [
         [
             state["label"],
             state["micro_start"] if mesh.startswith("micro") else state[mesh]["start"],
             mesh,
-            "–" if state[mesh]["l_e"] is None else f"{state[mesh]['l_e']:.3g}",
+            cutoff(state[mesh]),
             str(state[mesh]["iterations"]),
             figure(state[mesh]["last_step"], ".1e"),
             "yes" if state[mesh]["converged"] else "NO",
@@ -60,10 +60,14 @@ def convergence_table(summary: dict) -> list[str]:
         for state in summary["states"]
         for mesh in summary["meshes"]
     ]
-    return list_table(
-        ["state", "start", "mesh", "l_E, voxel", "iterations", "last rms(du), voxel", "converged"],
-        rows,
-    )
+    header = ["state", "start", "mesh", "l_E or l_L, voxel", "iterations"]
+    return list_table([*header, "last rms(du), voxel", "converged"], rows)
+
+
+def cutoff(result: dict) -> str:
+    """l_E of a micro result of the default kind, l_L of a meso one."""
+    length = result["l_e"] or result["l_l"]
+    return f"{length:.3g}" if length else "–"
 
 
 def meshes_table(summary: dict) -> list[str]:

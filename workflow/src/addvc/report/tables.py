@@ -139,7 +139,7 @@ def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
     before = case.meso[max(case.meso.index(name) - 1, 0)]
     return {
         "Matching functional": "Eq. 2" if options.cutoff == 0 else "Eq. 9 with T = L",
-        "Regularisation length (voxels)": f"l_L = {options.cutoff:.3g}",
+        "Regularisation length (voxels)": f"l_L = {span(case.cutoffs(name) or [options.cutoff], '.3g')}",
         "Initialisation": "coarse to fine" if coarsest else f"solution of {before}",
     }
 
@@ -150,7 +150,7 @@ def _micro(case: Case, config: dict, name: str, method: str) -> dict[str, str]:
     if method == "eq10":
         functional, lengths = "Eq. 10", f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}"
     else:
-        chosen = [case.cutoff(name, state) for state in case.states] or [options.l_e]
+        chosen = case.cutoffs(name) or [options.l_e]
         functional, lengths = method.replace("_", " "), f"l_E = {span(chosen, '.3g')}"
     return {
         "Matching functional": functional,
