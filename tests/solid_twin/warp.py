@@ -75,7 +75,7 @@ def warp(
         line = np.arange(n, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
         source[axis] = np.clip(line - source[axis], 0, n - 1)
     grey = ndimage.map_coordinates(
-        interpolating_coefficients(volume), source, np.float32, 3, mode="mirror", prefilter=False
+        interpolating_coefficients(volume, 3), source, np.float32, 3, mode="mirror", prefilter=False
     )
     grey += noise * np.random.default_rng([seed, 1]).standard_normal(grey.shape, np.float32)
     if volume.dtype.kind in "iu":

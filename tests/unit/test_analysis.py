@@ -8,7 +8,7 @@ from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_r
 from addvc.analysis.summary import costs
 from addvc.analysis.truth import error_statistics, errors_at, load_truth
 from addvc.analysis.validity import nodal_residual, valid_nodes, verdict
-from addvc.correlation.doubt import nodal_square, residual_limit
+from addvc.correlation.doubt import LIMIT, nodal_square, residual_limit
 from addvc.correlation.metric import Reference
 from addvc.fem.mesh import Mesh
 from addvc.fem.quadrature import gauss_points
@@ -126,9 +126,9 @@ def test_residual_around_a_node_knows_what_is_unknown():
     np.testing.assert_array_equal(found, [np.nan, 3, 3, 3, 3])
 
 
-def test_a_node_is_valid_up_to_twice_the_noise_of_a_difference():
+def test_a_node_is_valid_up_to_a_multiple_of_the_noise_of_a_difference():
     limit = residual_limit(2.0)
-    assert limit == pytest.approx(2 * np.hypot(2, 2))
+    assert limit == pytest.approx(LIMIT * np.hypot(2, 2))
     around = np.array([0.999 * limit, 1.001 * limit, np.nan, 0.0])
     np.testing.assert_array_equal(valid_nodes(around, 2.0), [True, False, False, True])
 

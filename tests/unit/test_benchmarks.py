@@ -38,7 +38,9 @@ def test_truth_of_a_pair_is_that_of_its_images(pair):
     points = points[((points > 6) & (points < OPTIONS.side - 7)).all(axis=1)]
     u = truth.displacement(points, 1)
     at = (points + u).T
-    found = ndimage.map_coordinates(interpolating_coefficients(after), at, order=3, prefilter=False)
+    found = ndimage.map_coordinates(
+        interpolating_coefficients(after, 3), at, order=3, prefilter=False
+    )
     here = tuple(points.astype(int).T)
     r, rest = before[here] - found, (before - after)[here]
     print(

@@ -174,7 +174,7 @@ def waved(image, amplitude, sigma, seed):
         return amplitude * np.sin(2 * np.pi * x[:, [1, 2, 0]] / 20)
 
     x = np.argwhere(np.ones(image.shape, bool)).astype(float)
-    moved = spline_value(image, np.clip(x - wave(x - wave(x)), 0, 47), 3)[0]
+    moved = spline_value(image, np.clip(x - wave(x - wave(x)), 0, 47))[0]
     noise = sigma * np.random.default_rng(seed).standard_normal(image.size)
     return (moved + noise).reshape(image.shape).astype(np.float32), wave
 
@@ -186,7 +186,7 @@ def test_the_cut_off_follows_the_motion_and_the_noise(speckle, box, amplitude, s
     image, _ = waved(still, 0.0, sigma, 2417)
     deformed, wave = waved(still, amplitude, sigma, 6113)
     mesh = box((6, 6, 6), (42, 42, 42), (8, 8, 8))
-    options = MesoOptions(AXIS, 6.0, 24.0, degree=3)
+    options = MesoOptions(AXIS, 6.0, 24.0)
     ladder = Ladder(Noise(sigma, 0.0), shortest=-2, draws=4)
     found = {}
     for name, given in (("as it is", None), ("chosen", ladder)):

@@ -288,7 +288,7 @@ def test_what_cannot_be_solved_is_left_as_measured(pressed, monkeypatch):
     """The matrix may be positive definite for the fit, and no longer be when it is judged."""
     held, motion, points = pressed
     draws = noise_of(points, 3)
-    monkeypatch.setattr(frame_filter, "solver", lambda matrix: None)
+    monkeypatch.setattr(frame_filter, "solver_or_none", lambda matrix: None)
     assert judged(problem(pressed), motion, 1e3, draws) is None
     monkeypatch.undo()
     monkeypatch.setattr(frame_filter, "judged", lambda *given: None)

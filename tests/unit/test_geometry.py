@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.interpolate import BSpline
 
 from addvc.errors import GeometryError, MeshError
 from addvc.fem.mesh import (
@@ -35,7 +36,7 @@ from addvc.geometry.surface import (
     remeshed,
 )
 from addvc.geometry.tets import TetOptions, largest_piece, tetrahedralise
-from addvc.geometry.threshold import FLAT, bisect_threshold, check_contrast, noise_of
+from addvc.geometry.threshold import FLAT, bisect_threshold, check_contrast, noise_of, void_noise
 from addvc.images.specimen import Specimen
 
 SHELL_PEAK = 7.7253 / (2 * np.pi)  # second maximum of sin(2 pi r) / (2 pi r), in wavelengths
@@ -372,8 +373,22 @@ def test_grid_reaches_into_the_platens_it_can_see():
     assert_allclose(grid_lines(shape, none, 3, 4, 10.0)[1], np.linspace(0, 49, 5))
 
 
+@pytest.mark.parametrize("degree", [3, 5])
+def test_the_spline_has_less_noise_than_its_voxels(degree):
+    """White noise at random places: sum_k B_p(x - k)^2 is B_2p+1(0) on average, along each axis."""
+    smooth = 2 * np.random.default_rng(2417).standard_normal((50, 50, 50)).astype(np.float32)
+    knots = np.arange(2 * degree + 3) - (degree + 1.0)
+    share = BSpline.basis_element(knots)(0.0) ** 1.5
+    noise, at_points = void_noise(smooth, np.ones(smooth.shape, bool), 50.0, degree)
+    assert noise == pytest.approx(2, rel=0.02)
+    assert at_points == pytest.approx(2 * share, rel=0.02)
+    assert void_noise(smooth, np.ones(smooth.shape, bool), -50.0, degree) is None
+
+
 def test_a_flat_void_has_the_noise_of_a_share_of_the_contrast():
     levels = {"void": 20.0, "solid": 120.0, "noise": 0.0}
-    assert noise_of(levels, None)["noise"] == noise_of(levels, 1e-9)["noise"] == 100 * FLAT
+    assert noise_of(levels, None)["noise"] == noise_of(levels, (1e-9, 1e-9))["noise"] == 100 * FLAT
     assert noise_of(levels | {"noise": 3.0}, None)["noise"] == 3.0
-    assert noise_of(levels, 2.0) == {"noise": 2.0, "noise_from": "void 3 voxels off the solid"}
+    far = noise_of(levels, (2.0, 1.5))
+    assert (far["noise"], far["noise_at_points"]) == (2.0, 1.5)
+    assert far["noise_from"] == "void 3 voxels off the solid"

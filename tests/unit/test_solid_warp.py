@@ -72,9 +72,9 @@ def test_a_compressed_scan_agrees_with_its_truth():
     moved, twice = warp(volume, mesh, step.x, 0.0, 1)
     truth = MeshTruth(mesh.points, mesh.cells, [step.x - mesh.points])
     at = gauss_points(mesh.linear).points
-    one, two = interpolating_coefficients(volume), interpolating_coefficients(moved)
+    one, two = interpolating_coefficients(volume, 3), interpolating_coefficients(moved, 3)
     y = at + truth.displacement(at, 1)
-    r, still = (spline_value(one, at)[0] - spline_value(two, p)[0] for p in (y, at))
+    r, still = (spline_value(one, at, 3)[0] - spline_value(two, p, 3)[0] for p in (y, at))
     inside = ((at > 2) & (at < np.array(volume.shape) - 3)).all(axis=1)
     assert step.force > 0 and twice < 0.01
     assert inside.sum() > 2000

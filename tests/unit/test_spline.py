@@ -73,6 +73,12 @@ def test_an_impulse_shows_the_basis_spline(degree):
         assert_allclose(found, expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("kernel", [spline_value, spline_value_gradient])
+def test_other_degrees_are_refused(noise, kernel):
+    with pytest.raises(ValueError, match=r"must be 3 or 5: set images\.degree"):
+        kernel(noise, points(), 4)
+
+
 def test_a_higher_degree_sees_less_of_where_the_voxels_are():
     """A wave of 4 voxels that is moved by less than a voxel, and the points with it."""
     x, shifts = points(2000, margin=3), np.arange(8) / 8
@@ -88,9 +94,9 @@ def test_a_higher_degree_sees_less_of_where_the_voxels_are():
     assert change(5) < change(3) / 3
 
 
-def test_interpolating_coefficients_pass_through_the_voxels(noise):
-    inner = voxels()[np.all((voxels() >= 1) & (voxels() <= np.array(SHAPE) - 2), axis=1)]
-    value, _ = spline_value(interpolating_coefficients(noise), inner, 3)
+def test_interpolating_coefficients_pass_through_the_voxels(noise, degree):
+    inner = voxels()[np.all((voxels() >= 2) & (voxels() <= np.array(SHAPE) - 3), axis=1)]
+    value, _ = spline_value(interpolating_coefficients(noise, degree), inner, degree)
     assert_allclose(value, noise[tuple(inner.astype(int).T)], atol=1e-5)
 
 

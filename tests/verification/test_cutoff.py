@@ -5,7 +5,7 @@ import pytest
 
 from addvc.config import chooses
 from addvc.correlation.corotational import Stage, corotational, stage_system
-from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial
+from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial_of
 from addvc.correlation.metric import hessian
 from addvc.correlation.micro import ladder
 from addvc.correlation.register import Stop, register
@@ -29,7 +29,7 @@ def found(problem, deformed):
     rest = np.zeros_like(problem.reference.mesh.points)
     system = stage_system(problem, PLAN[0], rest)
     solution = register(system, deformed, rest, PLAN[0].stop)
-    return trial(system, deformed, solution.u, Ladder(LADDER.noise, draws=8))
+    return trial_of(system, deformed, solution.u, Ladder(LADDER.noise, draws=8))
 
 
 def test_risks_differ_as_the_errors_do(problem):
@@ -67,7 +67,7 @@ def test_noise_that_the_residual_does_not_hold_is_none(problem):
     deformed = image(lambda x: x, 31)
     system = stage_system(problem, PLAN[0], rest)
     u = register(system, deformed, rest, PLAN[0].stop).u
-    shares = [trial(system, deformed, u, Ladder(Noise(t * NOISE, 0.0))).share for t in (1, 10)]
+    shares = [trial_of(system, deformed, u, Ladder(Noise(t * NOISE, 0.0))).share for t in (1, 10)]
     assert shares[0] == pytest.approx(1, abs=0.2)
     assert shares[1] == pytest.approx(0.01, rel=0.2)
 

@@ -154,7 +154,7 @@ def test_an_image_of_nothing_is_a_result_that_did_not_converge_or_moves_nowhere(
 
 
 def test_no_cycles_no_mending():
-    levels = {"noise": 2.0}
+    levels = {"noise_at_points": 2.0}
     assert mending({"mending": 0}, levels) is None
     assert mending({"mending": 3}, levels).cycles == 3
 
@@ -181,11 +181,11 @@ def test_the_scale_follows_the_noise_but_not_below_a_third_of_the_contrast():
         "tolerance": 1e-3,
         "max_iterations": 40,
     }
-    levels = {"void": 20.0, "solid": 80.0, "noise": 4.0}
+    levels = {"void": 20.0, "solid": 80.0, "noise_at_points": 3.0}
     plan = stages(section, levels)
     assert [stage.scale for stage in plan] == [36.0] * 3
     assert [stage.stop for stage in plan] == [Stop(1e-2, 10)] * 2 + [Stop(1e-3, 40)]
-    assert stages(section, levels | {"noise": 0.0})[0].scale == 20.0
+    assert stages(section, levels | {"noise_at_points": 0.0})[0].scale == 20.0
     assert stages(section | {"robust": 12}, levels)[0].scale == 12.0
     assert stages(section | {"robust": "none"}, levels)[0].scale is None
     assert stages(section, levels, "without_robust")[0].scale is None

@@ -10,7 +10,7 @@ from addvc.runtime import job
 
 with job(snakemake):
     source = snakemake.input
-    micro, noise = read_mesh(source.micro), read_json(source.threshold)["noise"]
+    micro, noise = read_mesh(source.micro), read_json(source.threshold)["noise_at_points"]
     names, each = snakemake.params.names, (source.meshes, source.solutions, source.residuals)
     for name, path, solution, residual, result in zip(names, *each, snakemake.output, strict=True):
         mesh = read_mesh(path)

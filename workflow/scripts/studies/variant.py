@@ -19,7 +19,7 @@ with job(snakemake) as log:
     (solution, notes), residual = load_solution(source.solution), load_residual(source.residual)
     row["settings"]["l_e"] = notes.get("l_e", options.l_e)
     mesh, penalised = Mesh(points, cells), classes["penalised"] > 0
-    row |= variant_figures(mesh, penalised, options, solution, residual, levels["noise"])
+    row |= variant_figures(mesh, penalised, options, solution, residual, levels["noise_at_points"])
     figures = read_json(source.figures)
     row["kept"] = figures["kept_fraction"] * figures["voxel_kept_fraction"]
     row["error"] = read_json(source.error) if source.get("error") else None

@@ -2,7 +2,7 @@
 
 from addvc.geometry.threshold import find_threshold
 from addvc.images.files import read_json, write_json
-from addvc.images.scans import load_volume
+from addvc.images.scans_store import load_coefficients
 from addvc.images.specimen import Specimen
 from addvc.runtime import job
 
@@ -11,6 +11,7 @@ with job(snakemake) as log:
     levels = read_json(source.threshold)
     gamma = levels["void"] + params.factor * (levels["threshold"] - levels["void"])
     specimen = Specimen.from_dict(read_json(source.specimen))
-    result = find_threshold(load_volume(source.smooth)[0], specimen, params.porosity, gamma)
+    smooth, degree = load_coefficients(source.smooth)
+    result = find_threshold(smooth, specimen, params.porosity, gamma, degree)
     log.info("threshold %.2f, porosity %.4f", result["threshold"], result["porosity"])
     write_json(snakemake.output[0], result)

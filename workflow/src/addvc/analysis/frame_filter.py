@@ -136,7 +136,7 @@ class Fit:
         return filtered(self.solve, self.slopes, draws, at)
 
 
-def solver(matrix: sparse.csc_matrix) -> Solve | None:
+def solver_or_none(matrix: sparse.csc_matrix) -> Solve | None:
     """x (N,) of matrix (N, N) x = b, for any b; None where it is not positive definite. Pivots are not
     looked at, as `fem.solver` does: squared equations of balance are all but singular, and
     Gauss-Newton mends what is lost."""
@@ -154,7 +154,7 @@ def fitted(
     """The motion that is best with this weight, from another one; None where none is found."""
     for _ in range(ITERATIONS):
         matrix, right, slopes = problem.system(motion, weight, held)
-        solve = solver(matrix)
+        solve = solver_or_none(matrix)
         if solve is None:
             return None
         step = solve(right)
@@ -180,7 +180,7 @@ def judged(problem: Problem, motion: FrameMotion, weight: float, draws: np.ndarr
     """The fit with what the filter does to draws (d, k, 3) of the noise, not all of them zero; None
     where the matrix is not positive definite."""
     matrix, _, slopes = problem.system(motion, weight)
-    solve = solver(matrix)
+    solve = solver_or_none(matrix)
     if solve is None:
         return None
     left, noise = filtered(solve, slopes, draws), mean_square(draws)

@@ -14,6 +14,7 @@ from skimage import measure
 from addvc.fem.mesh import Mesh, boundary_faces, cell_volumes
 from addvc.fem.quadrature import voxel_owner
 from addvc.geometry.region import Region, caps_depth
+from addvc.geometry.sections import cut_depth
 
 REST = "rest"
 """The name of the mesh at rest among results."""
@@ -76,12 +77,6 @@ class CarriedRegion:
             nearest = across.query(np.delete(points, axis, axis=1))[1]
             depth = np.minimum(depth, inwards * (points[:, axis] - height[nearest]))
         return depth
-
-
-def cut_depth(region: Region, points: np.ndarray) -> np.ndarray:
-    """Depth (q,) of points (q, 3) below the caps where the region cuts through the solid."""
-    ends, sides = caps_depth(region, points)
-    return np.minimum(ends, sides) if region.cut_sides else ends
 
 
 def level_set(image: np.ndarray, gamma: float) -> tuple[np.ndarray, np.ndarray]:

@@ -129,21 +129,29 @@ def along_strut(branch: Branch, inner: np.ndarray, junctions: np.ndarray) -> np.
 
 
 def widening(branch: Branch, ends: np.ndarray) -> np.ndarray:
-    """Area of each piece (m,) over that measured for it: of a piece that leads to a junction that is the
-    area at its other end, beyond which the solid is that of several struts.
+    """Factor (m,) on the measured area of each piece, from the arc lengths (m + 1,) of their ends.
 
-    There the profile of the struts of polyurethane foams goes on, a = 1 + x^2 + 36 x^4 over that of
-    the middle, x from -1/2 to 1/2 [Gong2005], of which the piece has the section that bends as much:
-    a^-2 is the mean. On the default twin, whose struts have another profile, such pieces have .82 of
-    the true area without it and 1.14 with it."""
-    wider = np.ones(len(ends) - 1)
-    for end, piece, inner in ((0, 0, 1), (1, -1, -2)):
-        if branch.ends[end] == FREE_END or len(wider) < 2:
-            continue
-        x = np.linspace(ends[inner], ends[piece], 21) / ends[-1] - 0.5
-        area = 1 + x**2 + 36 * x**4
-        wider[piece] = np.mean(area**-2.0) ** -0.5 / area[0]
-    return wider
+    A piece that leads to a junction is measured at its inner end, since beyond that the solid is that
+    of several struts; it widens as `area_ratio` says. On the default twin, whose struts have another
+    profile, such pieces have .82 of the true area without it and 1.14 with it."""
+    factor = np.ones(len(ends) - 1)
+    if len(factor) < 2:
+        return factor
+    x, (first, last) = ends / ends[-1] - 0.5, branch.ends
+    if first != FREE_END:
+        factor[0] = area_ratio(x[1], x[0])
+    if last != FREE_END:
+        factor[-1] = area_ratio(x[-2], x[-1])
+    return factor
+
+
+def area_ratio(inner: float, junction: float) -> float:
+    """Area of the uniform piece that bends as much as a strut of polyurethane foam does between two
+    places, over that at the inner one; x is -1/2 to 1/2 along the strut, the area of its sections goes
+    as 1 + x^2 + 36 x^4 [Gong2005], their inertia with its square."""
+    x = np.linspace(inner, junction, 21)
+    area = 1 + x**2 + 36 * x**4
+    return float(np.mean(area**-2.0) ** -0.5 / area[0])
 
 
 def stations(branch: Branch, curve: Curve, junctions: np.ndarray, piece: float) -> np.ndarray:

@@ -94,7 +94,7 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.meshes}
     points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")
     trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
-    strain = shortening(points[trusted, axis], point["displacement"][trusted, axis])
+    strain = compression(points[trusted, axis], point["displacement"][trusted, axis])
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
     micro_notes = load_notes(folder / f"dvc/micro_start_state{state}.h5")
@@ -151,7 +151,7 @@ def freeform_figures(folder: Path, state: int, truth: bool) -> dict:
     }
 
 
-def shortening(position: np.ndarray, displacement: np.ndarray) -> float:
+def compression(position: np.ndarray, displacement: np.ndarray) -> float:
     """Overall compression: by how much the two end faces (a twentieth of the height) come nearer,
     over their distance; coordinates (n,) along the loading axis, voxels."""
     low, high = position.min(), position.max()

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial
+from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial_of
 from addvc.correlation.doubt import doubtful_nodes, without
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.metric import Reference, hessian, turned
@@ -121,15 +121,15 @@ def corotational(
     all stages and converged if the last one did; of the notes, `stages` has a row of figures for each,
     `c` and `l_e` are the weight of the energy and its cut-off in the end, `risk` the trials of l_E, all
     in grey levels^2 over the points."""
-    *early, last = stages
+    *before, last = stages
     done: list[tuple[Solution, dict]] = []
     trials: list[dict] = []
-    if ladder is not None and early:
-        problem, u, done, trials = with_cutoff(problem, deformed, u, early[0], ladder)
-    for stage in early[1:] if done else early:
+    if ladder is not None and before:
+        problem, u, done, trials = with_cutoff(problem, deformed, u, before[0], ladder)
+    for stage in before[1:] if done else before:
         done.append(run(problem, stage, deformed, u))
         u = done[-1][0].u
-    if mending is not None and early:
+    if mending is not None and before:
         for step in mended(problem, deformed, u, last, mending):
             done.append(step)
             u = step[0].u
@@ -156,7 +156,7 @@ def with_cutoff(
         if not np.isfinite(done[-1][0].history[-1]):
             return problem, u, done, trials
         u = done[-1][0].u
-        best, trials = least_risk(trial(system, deformed, u, ladder), ladder, rung)
+        best, trials = least_risk(trial_of(system, deformed, u, ladder), ladder, rung)
         trials = [row | {"l_e": row["times"] * problem.cutoff} for row in trials]
         problem = problem.cut_off(RATIO ** (best - rung))
         log.info("micro DVC: least risk at l_E = %.3g voxels", problem.cutoff)

@@ -72,7 +72,7 @@ class Trial:
     share: float
 
 
-def trial(system: System, deformed: np.ndarray, u: np.ndarray, ladder: Ladder) -> Trial:
+def trial_of(system: System, deformed: np.ndarray, u: np.ndarray, ladder: Ladder) -> Trial:
     """What every rung needs of `system`, whose u (n, 3) it is; `deformed`: spline coefficients."""
     reference = system.reference
     r, _ = residual(reference, deformed, u)
@@ -100,7 +100,7 @@ def misfit(system: System, deformed: np.ndarray, u: np.ndarray) -> float:
 
 def risk(trial: Trial, times: float) -> dict:
     """The risk of l_E `times` that of the system, less its constant, and its two parts."""
-    solve = solver(trial, times**2)
+    solve = solver_with(trial, times**2)
     step = solve(trial.pull - times**2 * trial.forces)
     fit = misfit(trial.system, trial.deformed, trial.u + step.reshape(-1, 3))
     freedom = 2 * trial.share * float(np.mean([n @ solve(n) for n in trial.noise]))
@@ -108,8 +108,10 @@ def risk(trial: Trial, times: float) -> dict:
     return {"times": times} | found
 
 
-def solver(trial: Trial, factor: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Solves (H + factor M) x = b: conjugate gradients, preconditioned by what the system has."""
+def solver_with(trial: Trial, factor: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Solves (H + factor M) x = b: conjugate gradients, preconditioned by what the system has.
+
+    It raises CorrelationError where they do not converge."""
     matrix = (trial.hessian + factor * trial.system.regularisation).tocsr()
     known = LinearOperator(matrix.shape, matvec=trial.system.factor.precondition)
 

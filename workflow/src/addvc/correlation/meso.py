@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from addvc.correlation.clear import clear_voxels
-from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial
+from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial_of
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.meso_start import chosen_register
 from addvc.correlation.metric import hessian, reference_on
@@ -192,7 +192,7 @@ def with_cutoff(
     """The solution with the l_L of least risk, from that of a system; l_L over the system's; the trials.
 
     Where the loop does not settle, the solution that was there and 1."""
-    rung, trials = least_risk(trial(system, deformed, solution.u, ladder), ladder, 0)
+    rung, trials = least_risk(trial_of(system, deformed, solution.u, ladder), ladder, 0)
     if rung == 0:
         return solution, 1.0, trials
     times = RATIO**rung

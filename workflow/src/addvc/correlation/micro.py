@@ -120,12 +120,13 @@ def shell_of(method: str, shell: Quadrature) -> Quadrature | None:
 def robust_scale(setting: str | float, levels: dict) -> float | None:
     """Scale of the robust weights (grey levels), None for least squares ("none").
 
-    "auto": nine times the noise, at least a third of the contrast between void and solid. Half, once
-    or twice as much changed the rms error by less than 0.003 voxel (twin, 3.4 and 12.3 %)."""
+    "auto": twelve times the noise of the splines, at least a third of the contrast between void and
+    solid. Half, once or twice as much changed the rms error by less than 0.003 voxel (twin, 3.4 and
+    12.3 %)."""
     if setting == "none":
         return None
     if setting == "auto":
-        return float(max(9 * levels["noise"], (levels["solid"] - levels["void"]) / 3))
+        return float(max(12 * levels["noise_at_points"], (levels["solid"] - levels["void"]) / 3))
     return float(setting)
 
 
@@ -155,4 +156,4 @@ def mending(section: dict, levels: dict) -> Mending | None:
     `levels`."""
     if section["mending"] == 0:
         return None
-    return Mending(section["mending"], residual_limit(levels["noise"]))
+    return Mending(section["mending"], residual_limit(levels["noise_at_points"]))

@@ -108,8 +108,32 @@ def submesh(mesh: Mesh, keep: np.ndarray) -> Mesh:
 
 
 def check_mesh(mesh: Mesh, name: str, min_dihedral: float = 0.0) -> dict:
-    """Figures of a mesh that may be used; MeshError where cells are inverted, flat or loose."""
+    """Figures of a mesh that may be used, lengths in voxels, angles in degrees. Raises MeshError where
+    it has no cells, or they are inverted, flat, loose, or sharper than `min_dihedral`."""
     volume = cell_volumes(mesh)
+    refuse_volumes(volume, name)
+    figures = {
+        "nodes": len(mesh.points),
+        "cells": len(mesh.cells),
+        "volume": float(volume.sum()),
+        "mean_volume": float(volume.mean()),
+    }
+    if not mesh.is_tet:
+        return figures
+    smallest, largest = dihedral_range(mesh)
+    refuse_loose(mesh, name)
+    refuse_sharp(smallest, name, min_dihedral)
+    return figures | {
+        "components": 1,
+        "mean_edge": mean_edge_length(mesh),
+        "min_dihedral": float(smallest.min()),
+        "min_dihedral_p01": float(np.percentile(smallest, 1)),
+        "max_dihedral": float(largest.max()),
+    }
+
+
+def refuse_volumes(volume: np.ndarray, name: str) -> None:
+    """Raises MeshError where there is no cell, or a volume (m,) is not positive."""
     if len(volume) == 0:
         raise MeshError(f"{name}: no cells; the region holds no solid: widen it")
     if (volume <= 0).any():
@@ -117,34 +141,27 @@ def check_mesh(mesh: Mesh, name: str, min_dihedral: float = 0.0) -> dict:
             f"{name}: {(volume <= 0).sum()} of {len(volume)} cells are inverted or flat (smallest "
             f"volume {volume.min():.2e} voxel^3, must be above 0); change mesh.size or meso.sizes"
         )
-    report = {
-        "nodes": len(mesh.points),
-        "cells": len(mesh.cells),
-        "volume": float(volume.sum()),
-        "mean_volume": float(volume.mean()),
-    }
-    if not mesh.is_tet:
-        return report
+
+
+def refuse_loose(mesh: Mesh, name: str) -> None:
+    """Raises MeshError where a mesh is not one piece by the faces of its cells."""
     loose = int(face_components(mesh).max())
     if loose:
         raise MeshError(
             f"{name}: {loose} pieces are not attached by a face to the largest one "
             "(limit 0); keep the largest component only"
         )
-    smallest, largest = dihedral_range(mesh)
-    if smallest.min() < min_dihedral:
+
+
+def refuse_sharp(smallest: np.ndarray, name: str, limit: float) -> None:
+    """Raises MeshError where the smallest dihedral angle of a tetrahedron (m,) is below the limit,
+    degrees."""
+    if smallest.min() < limit:
         raise MeshError(
-            f"{name}: {(smallest < min_dihedral).sum()} of {len(volume)} tetrahedra have a dihedral "
-            f"angle below {min_dihedral} degrees (smallest {smallest.min():.2g}); change "
+            f"{name}: {(smallest < limit).sum()} of {len(smallest)} tetrahedra have a dihedral "
+            f"angle below {limit} degrees (smallest {smallest.min():.2g}); change "
             "mesh.size or meso.sizes, or lower mesh.min_dihedral"
         )
-    return report | {
-        "components": 1,
-        "mean_edge": mean_edge_length(mesh),
-        "min_dihedral": float(smallest.min()),
-        "min_dihedral_p01": float(np.percentile(smallest, 1)),
-        "max_dihedral": float(largest.max()),
-    }
 
 
 def oriented(mesh: Mesh) -> Mesh:

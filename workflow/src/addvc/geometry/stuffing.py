@@ -18,6 +18,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from addvc.fem.mesh import TET_EDGES, Mesh, oriented
+from addvc.images.spline import interpolating_coefficients
 
 NEAR_LONG, NEAR_SHORT = 0.24, 0.40  # of the edge: a lattice point is moved onto a nearer cut
 NECK = 0.65  # of the spacing: the least radius of a strut
@@ -53,7 +54,7 @@ class _Field:
     skeleton of the solid; what is outside of the image is below gamma."""
 
     def __init__(self, grey, gamma, neck):
-        self.coefficients = ndimage.spline_filter(grey - np.float32(gamma), 3, np.float32, "mirror")
+        self.coefficients = interpolating_coefficients(grey - np.float32(gamma), 3)
         self.neck, self.slope = neck, float(grey.max() - gamma) / 2
         thin = neck > 0 and self.slope > 0
         self.skeleton = cKDTree(skeleton_points(grey > gamma)) if thin else None

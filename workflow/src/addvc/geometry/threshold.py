@@ -12,8 +12,14 @@ import numpy as np
 from scipy import ndimage
 
 from addvc.errors import GeometryError
+from addvc.images.specimen import Specimen
+from addvc.images.spline import DEGREE, spline_value
 
 log = logging.getLogger(__name__)
+
+SEED = 2417
+MOST = 1_000_000
+"""Voxels of the void that its noise is read from; of more, some are left out."""
 
 FLAT = 0.002
 """Noise over the contrast of solid and void, at least; that of a good scan is some hundredths."""
@@ -45,7 +51,8 @@ def bisect_threshold(
 
 
 def check_contrast(grey: np.ndarray, gamma: float) -> dict:
-    """Medians of void and solid and the noise of the void; GeometryError if gamma is in the noise.
+    """Medians of void and solid and the noise of the void, of grey levels (n,); GeometryError if gamma
+    is in the noise.
 
     The noise is 1.48 times the median absolute deviation of what is below gamma."""
     void, solid = grey[grey < gamma], grey[grey >= gamma]
@@ -67,20 +74,28 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
     return {"void": level, "solid": float(np.median(solid)), "noise": noise}
 
 
-def specimen_mask(shape: tuple[int, int, int], specimen, margin: float = 3.0) -> np.ndarray:
+def specimen_mask(
+    shape: tuple[int, int, int], specimen: Specimen, margin: float = 3.0
+) -> np.ndarray:
     """Voxels (nx, ny, nz) of the specimen, `margin` off the platens (their blurred faces)."""
     inner = replace(specimen, low=specimen.low + margin, high=specimen.high - margin)
     return inner.voxel_mask(shape)
 
 
-def void_noise(smooth: np.ndarray, mask: np.ndarray, gamma: float, away: int = 3) -> float | None:
-    """Noise of the void at least `away` voxels from any solid, whose blurred halo is no noise.
+def void_noise(
+    smooth: np.ndarray, mask: np.ndarray, gamma: float, degree: int = DEGREE
+) -> tuple[float, float] | None:
+    """Noise of the void far from any solid, whose blurred halo is no noise: of its voxels, and of the
+    spline of this degree at random places in them, which smooths it.
 
-    1.48 times the median absolute deviation; None where less than 1 % of the mask is that far."""
-    void = mask & far_void(smooth, gamma, away)
-    if void.sum() < 0.01 * mask.sum():
+    None where less than 1 % of the mask (nx, ny, nz) is that far."""
+    void = np.flatnonzero(mask & far_void(smooth, gamma))
+    if len(void) < 0.01 * mask.sum():
         return None
-    return robust_deviation(smooth[void])
+    centres = np.stack(np.unravel_index(void[:: -(-len(void) // MOST)], mask.shape), axis=1)
+    places = centres + np.random.default_rng(SEED).uniform(-0.5, 0.5, centres.shape)
+    value, inside = spline_value(smooth, places, degree)
+    return robust_deviation(smooth.ravel()[void]), robust_deviation(value[inside])
 
 
 def robust_deviation(x: np.ndarray) -> float:
@@ -93,38 +108,46 @@ def far_void(smooth: np.ndarray, gamma: float, away: int = 3) -> np.ndarray:
     return ~ndimage.binary_dilation(smooth >= gamma, iterations=away)
 
 
-def find_threshold(smooth: np.ndarray, specimen, porosity: float, setting: str | float) -> dict:
-    """gamma ("auto": by bisection; a number: given), what it gives, and the levels around it."""
+def find_threshold(
+    smooth: np.ndarray,
+    specimen: Specimen,
+    porosity: float,
+    setting: str | float,
+    degree: int = DEGREE,
+) -> dict:
+    """gamma ("auto": by bisection; a number: given) of spline coefficients (nx, ny, nz), what it gives,
+    and the levels around it. Raises GeometryError where the specimen holds no voxel."""
     mask = specimen_mask(smooth.shape, specimen)
     grey = smooth[mask]
     if len(grey) == 0:
         raise GeometryError(f"the specimen holds no voxel ({specimen}); check scans.platens")
     gamma, trials = bisect_threshold(grey, porosity) if setting == "auto" else (setting, [])
     levels = check_contrast(grey, gamma)
-    far = void_noise(smooth, mask, gamma)
     return levels | {
         "threshold": float(gamma),
         "porosity": float(np.mean(grey < gamma)),
         "target": porosity,
         "trials": trials,
-        **noise_of(levels, far),
+        **noise_of(levels, void_noise(smooth, mask, gamma, degree)),
     }
 
 
-def noise_of(levels: dict, far: float | None) -> dict:
-    """The noise (grey levels) and where it is from: of the void `far` from any solid, of all void where
-    there is none such. Of a flat void FLAT of the contrast: no residual is below nothing."""
-    noise, origin = levels["noise"], "all void"
+def noise_of(levels: dict, far: tuple[float, float] | None) -> dict:
+    """`noise` of the voxels and `noise_at_points` of the spline between them (grey levels), and where
+    they are from: `far`, of the void far from any solid, or all void where that is None. Of a flat void
+    FLAT of the contrast: no residual is below nothing."""
+    noise, origin = (levels["noise"], levels["noise"]), "all void"
     if far is not None:
         noise, origin = far, "void 3 voxels off the solid"
     least = FLAT * (levels["solid"] - levels["void"])
-    if noise >= least:
-        return {"noise": noise, "noise_from": origin}
-    log.warning(
-        "WARNING: the void is flat (noise %.2g grey levels): was the scan denoised or segmented? %.1f "
-        "%% of the contrast, %.2g, is taken for its noise; give the scans as they were reconstructed",
-        noise,
-        100 * FLAT,
-        least,
-    )
-    return {"noise": least, "noise_from": f"{FLAT:.1%} of the contrast: the void is flat"}
+    if noise[0] < least:
+        log.warning(
+            "WARNING: the void is flat (noise %.2g grey levels): was the scan denoised or segmented? "
+            "%.1f %% of the contrast, %.2g, is taken for its noise; give the scans as they were "
+            "reconstructed",
+            noise[0],
+            100 * FLAT,
+            least,
+        )
+        noise, origin = (least, least), f"{FLAT:.1%} of the contrast: the void is flat"
+    return {"noise": noise[0], "noise_at_points": noise[1], "noise_from": origin}

@@ -103,7 +103,7 @@ def _record(checked: Checked) -> dict:
         "path": str(scan.path),
         "shape": list(scan.shape),
         "binned_shape": list(checked.binned),
-        "dtype": str(scan.dtype),
+        "dtype": scan.dtype.name,
         "bytes": size,
         "fingerprint": digest.hexdigest(),
     }

@@ -2,7 +2,7 @@
 
 The voxels are the coefficients themselves (no prefilter), as in the paper: the representation
 smooths a little instead of interpolating, which keeps gradients regular. `interpolating_coefficients`
-gives those of the cubic spline through the voxels. Beyond the outermost voxels the edge voxel is
+gives those of the spline through the voxels. Beyond the outermost voxels the edge voxel is
 repeated; points beyond the outermost voxel centres are "outside".
 
 The paper has p = 3. A spline of degree p lets sin(w / 2) / (w / 2) to the power p + 1 of what lies
@@ -21,10 +21,13 @@ from scipy import ndimage
 DEGREE = 5
 """p of Eq. 4: 3 or 5."""
 
+WRONG_DEGREE = "the degree of the splines must be 3 or 5: set images.degree to one of these"
 
-def interpolating_coefficients(volume: np.ndarray) -> np.ndarray:
-    """Coefficients of the cubic B-spline through every inner voxel of `volume` (nx, ny, nz), float32."""
-    return ndimage.spline_filter(volume, order=3, output=np.float32, mode="mirror")
+
+def interpolating_coefficients(volume: np.ndarray, degree: int = DEGREE) -> np.ndarray:
+    """Coefficients (nx, ny, nz), float32, of the B-spline of this degree through every inner voxel of
+    `volume` (nx, ny, nz)."""
+    return ndimage.spline_filter(volume, order=degree, output=np.float32, mode="mirror")
 
 
 def gaussian_blur(volume: np.ndarray, sigma: float) -> np.ndarray:
@@ -127,7 +130,11 @@ def _sum(row, at, weights):
 
 @nb.njit(parallel=True, cache=True)
 def spline_value(coefficients, points, degree=DEGREE):
-    """Value of the spline at points (n, 3) in voxels: values (n,) float32, inside (n,) bool."""
+    """Value of the spline at points (n, 3) in voxels: values (n,) float32, inside (n,) bool.
+
+    Raises ValueError for any degree but 3 and 5."""
+    if degree != 3 and degree != 5:
+        raise ValueError(WRONG_DEGREE)
     nx, ny, nz = coefficients.shape
     n = points.shape[0]
     value = np.zeros(n, np.float32)
@@ -153,7 +160,11 @@ def spline_value(coefficients, points, degree=DEGREE):
 
 @nb.njit(parallel=True, cache=True)
 def spline_value_gradient(coefficients, points, degree=DEGREE):
-    """Value (n,), gradient (n, 3) per voxel, both float32, and inside (n,) bool at points (n, 3)."""
+    """Value (n,), gradient (n, 3) per voxel, both float32, and inside (n,) bool at points (n, 3).
+
+    Raises ValueError for any degree but 3 and 5."""
+    if degree != 3 and degree != 5:
+        raise ValueError(WRONG_DEGREE)
     nx, ny, nz = coefficients.shape
     n = points.shape[0]
     value = np.zeros(n, np.float32)

@@ -54,37 +54,52 @@ def topology_warnings(counts: dict | None) -> list[str]:
 
 def state_warnings(state: dict, summary: dict) -> list[str]:
     """What to distrust of one state: loops that did not end, nodes in doubt, a failure."""
-    found = []
-    for mesh in summary["meshes"]:
-        one = state[mesh]
-        if not one["converged"]:
-            found.append(
-                f"- State {state['state']}, {mesh}: the loop did not end in "
-                f"{one['iterations']} iterations (last rms(du) {figure(one['last_step'], '.1e')} "
-                "voxel). Look at the residual maps (Fig. 13); a longer "
-                "regularisation length or a better start may help."
-            )
-    doubtful = 1 - state[micro_name(summary)]["valid_nodes"]
-    if state["verdict"] == "flagged" and doubtful > 0.05:
-        found.append(
-            f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
-            "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
-            "look at the residual maps (Fig. 13)."
-        )
-    struts = state.get("struts") or {"valid": 0, "flagged": 0}
-    count = struts["valid"] + struts["flagged"]
-    if struts["flagged"] > 0.1 * count:
-        found.append(
-            f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
-            "flagged: broken by the threshold, not measured, or on nodes in doubt. What is said of "
-            "bending leaves them out; the scene shows where they are."
-        )
+    micro = micro_name(summary)
+    found = [line for mesh in summary["meshes"] for line in loop_warnings(state, mesh)]
+    found += doubt_warnings(state, micro) + flag_warnings(state)
     if state["verdict"] == "failed":
         found.append(
             f"- State {state['state']} could not be registered: at least half of its nodes "
             "have a residual far above the noise of the images."
         )
-    return found + equilibrium_warnings(state) + residual_warnings(state, micro_name(summary))
+    return found + equilibrium_warnings(state) + residual_warnings(state, micro)
+
+
+def loop_warnings(state: dict, mesh: str) -> list[str]:
+    """One line where the loop of a mesh did not end by its criterion."""
+    one = state[mesh]
+    if one["converged"]:
+        return []
+    return [
+        f"- State {state['state']}, {mesh}: the loop did not end in {one['iterations']} iterations "
+        f"(last rms(du) {figure(one['last_step'], '.1e')} voxel). Look at the residual maps "
+        "(Fig. 13); a longer regularisation length or a better start may help."
+    ]
+
+
+def doubt_warnings(state: dict, micro: str) -> list[str]:
+    """One line where more than a few nodes are in doubt."""
+    doubtful = 1 - state[micro]["valid_nodes"]
+    if state["verdict"] != "flagged" or doubtful <= 0.05:
+        return []
+    return [
+        f"- State {state['state']}: {doubtful:.1%} of the nodes (at most 5 %) have a residual "
+        "far above the noise of the images. Leave them out (`valid` in the fields is 0), and "
+        "look at the residual maps (Fig. 13)."
+    ]
+
+
+def flag_warnings(state: dict) -> list[str]:
+    """One line where more than a few struts are flagged."""
+    struts = state.get("struts") or {"valid": 0, "flagged": 0}
+    count = struts["valid"] + struts["flagged"]
+    if struts["flagged"] <= 0.1 * count:
+        return []
+    return [
+        f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
+        "flagged: broken by the threshold, not measured, or on nodes in doubt. What is said of "
+        "bending leaves them out; the scene shows where they are."
+    ]
 
 
 def equilibrium_warnings(state: dict) -> list[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from addvc.report.case import Case
-from addvc.report.tables import write_table
+from addvc.report.tables import write_tables
 
 
 def difficulty(case: Case, outputs: Iterable[str]) -> None:
@@ -24,8 +24,7 @@ def difficulty(case: Case, outputs: Iterable[str]) -> None:
         if "rotation" in first:
             values = (f"{s['rotation'][key]:.1f}" for s in states)
             rows.append([f"Rotation of the struts, {name}", "degree", *values])
-    for path in outputs:
-        write_table(path, rows)
+    write_tables(outputs, rows)
 
 
 def twin_check(case: Case, outputs: Iterable[str]) -> None:
@@ -35,5 +34,4 @@ def twin_check(case: Case, outputs: Iterable[str]) -> None:
         low, high = ("–" if x is None else f"{x:.4g}" for x in (check["low"], check["high"]))
         holds = "yes" if check["passed"] else "NO"
         rows.append([check["name"], f"{check['value']:.4g}", check["unit"], low, high, holds])
-    for path in outputs:
-        write_table(path, rows)
+    write_tables(outputs, rows)

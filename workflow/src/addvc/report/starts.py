@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from addvc.correlation.store import load_notes
 from addvc.report.case import Case
-from addvc.report.tables import write_table
+from addvc.report.tables import write_tables
 
 FIGURES = {
     "residual_std": ("σ(r) (grey levels)", "{:.3f}"),
@@ -27,8 +27,7 @@ def starts(case: Case, outputs: Iterable[str]) -> None:
                 [case.title(state, case.micro[0]), result, *_row(one, notes["best"])]
                 for one in notes["candidates"]
             ]
-    for path in outputs:
-        write_table(path, rows)
+    write_tables(outputs, rows)
 
 
 def _row(candidate: dict, best: str) -> list[str]:

@@ -2,8 +2,11 @@
 
 import csv
 import html
+import math
 from collections.abc import Iterable
 from pathlib import Path
+
+import numpy as np
 
 from addvc.analysis.overlap import REST
 from addvc.correlation.meso import meso_options
@@ -78,8 +81,7 @@ def acquisition(case: Case, outputs: Iterable[str], config: dict) -> None:
         for key, (name, unit) in TWIN.items()
         if key in config.get("twin", {})
     ]
-    for path in outputs:
-        write_table(path, rows)
+    write_tables(outputs, rows)
 
 
 def source(config: dict) -> str:
@@ -91,9 +93,7 @@ def source(config: dict) -> str:
 
 def memory(scan: dict) -> float:
     """Megabytes of a scan once it is read: the file may be compressed."""
-    bits = "".join(c for c in str(scan["dtype"]) if c.isdigit()) or "8"
-    x, y, z = scan["shape"]
-    return x * y * z * int(bits) / 8 / 1e6
+    return math.prod(scan["shape"]) * np.dtype(scan["dtype"]).itemsize / 1e6
 
 
 def times(shape: Iterable[int]) -> str:
@@ -107,8 +107,7 @@ def parameters(case: Case, outputs: Iterable[str], config: dict, methods: dict[s
     keys = list(columns[names[0]])
     rows = [["Parameter", *names]]
     rows += [[key, *(columns[name][key] for name in names)] for key in keys]
-    for path in outputs:
-        write_table(path, rows)
+    write_tables(outputs, rows)
 
 
 def _column(case: Case, name: str, config: dict, methods: dict[str, str]) -> dict[str, str]:
@@ -203,8 +202,7 @@ def overlaps(case: Case, outputs: Iterable[str]) -> None:
             [case.title(state, name), name, *_overlap(results[name])]
             for name in (case.finest, *case.micro)
         ]
-    for path in outputs:
-        write_table(path, rows)
+    write_tables(outputs, rows)
 
 
 def _overlap(found: dict) -> list[str]:

@@ -18,6 +18,7 @@ from scipy import ndimage
 from addvc.errors import ConfigError
 from addvc.images.files import write_json
 from addvc.images.levels import to_coarse
+from addvc.images.spline import interpolating_coefficients
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def warp(
     The reference is interpolated by cubic splines; beyond its border the nearest voxel is taken."""
     spans = [np.arange(0, n / bin, field.wavelength / 8) for n in volume.shape]
     field.displacement(np.stack(np.meshgrid(*spans, indexing="ij"), -1).reshape(-1, 3), state)
-    coefficients = ndimage.spline_filter(volume, 3, np.float32, mode="mirror")
+    coefficients = interpolating_coefficients(volume, 3)
     last = np.array(volume.shape) - 1
     rng = np.random.default_rng([seed, state])
     grid = np.stack(
