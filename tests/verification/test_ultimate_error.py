@@ -3,7 +3,8 @@
 The images are periodic and blurred by 0.8 voxel (Eq. 8) as in the paper; boxes of tetrahedra whose
 mean edge is 33, 23 or 12 voxels, 33 without regularisation, the others with the Laplacian of Eq. 9
 and l_L = 35 voxels; splines of the degree of the paper, 3, and of the default, 5. The error of a
-shift is, over all nodes and components: `std`, the standard deviation of each component over the nodes, at worst; `bias`, the mean of each component, at worst;
+shift is, over all nodes and components: `std`, the standard deviation of each component over the
+nodes, at worst; `bias`, the mean of each component, at worst;
 `rms`, both together. The paper does not say which one it gives: all three must stay below.
 """
 
