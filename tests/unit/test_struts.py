@@ -34,6 +34,7 @@ from addvc.correlation.store import save_solution
 from addvc.fem.io import write_vtu
 from addvc.fem.mesh import Mesh, cell_volumes
 from addvc.geometry.centre_line import Curve, centre_line
+from addvc.geometry.lines import resampled
 from addvc.geometry.skeleton import FREE_END, Branch, kinks, simplified, strut_graph
 from addvc.images.files import write_json
 from addvc.report.case import Case
@@ -425,6 +426,19 @@ def test_the_centre_line_of_a_bar_is_found_below_a_voxel():
     axis = (ends[1] - ends[0]) / length
     off = (found - ends[0]) - np.outer((found - ends[0]) @ axis, axis)
     assert np.linalg.norm(off, axis=1).max() < 0.15
+
+
+def test_the_line_of_a_branch_as_short_as_it_is_wide_stays_in_it(rng):
+    """Its voxels may hardly differ in their arc length, so that a parabola leads anywhere."""
+    x = np.indices((24, 24, 24)).reshape(3, -1).T
+    ball = 50.0 * (np.linalg.norm(x - 11.5, axis=1) < 4).reshape(24, 24, 24)
+    for length in rng.uniform(1.7, 6, 200):
+        way = rng.normal(size=3)
+        way *= length / np.linalg.norm(way)
+        line = resampled(11.5 + rng.uniform(-1, 1, 3) + np.outer([-0.5, 0.5], way))
+        bounds = 0.3 * length, 0.7 * length
+        curve = centre_line(line, bounds, 1.5, ball + 20 * rng.normal(size=ball.shape))
+        assert curve.astray(line) <= 2.5
 
 
 def test_points_find_their_place_on_a_curve():

@@ -53,6 +53,11 @@ class Curve:
         """dx/ds (q, 3), of a length near one."""
         return self._slope((s - self.middle) / self.half) / self.half
 
+    def astray(self, line: np.ndarray) -> float:
+        """Distance (voxels) from a line (k, 3) of the point of the curve that is farthest from it."""
+        points = self(np.linspace(self.middle - self.half, self.middle + self.half, 9))
+        return float(cKDTree(line).query(points)[0].max())
+
     def _slope(self, x: np.ndarray) -> np.ndarray:
         return polynomial.polyval(np.clip(x, -1, 1), polynomial.polyder(self.coefficients)).T
 
@@ -81,11 +86,15 @@ def centre_line(
     """The curve between two arc lengths of a line (k, 3) through the centroids of `excess`
     (nx, ny, nz), the grey level above that of the void, in a strut of this radius; voxels.
 
-    Weights fall as a parabola to zero at a distance of MARGIN from the surface."""
+    Weights fall as a parabola to zero at a distance of MARGIN from the surface. Of a branch as short as
+    it is wide the voxels may hardly differ in their arc length, and say nothing of a curve: one that
+    leaves the strut is not taken."""
     arc, reach = arc_length(line), radius + MARGIN
     voxels = _around(line, reach + 1, excess.shape)
     grey = np.clip(excess[tuple(voxels.T)], 0, None)
     inside = (arc >= bounds[0]) & (arc <= bounds[1])
+    if inside.sum() <= DEGREE:
+        inside[:] = True
     curve = Curve.fit(bounds, arc[inside], line[inside], np.ones(inside.sum()))
     s = along(line, voxels)
     for _ in range(ROUNDS):
@@ -94,7 +103,10 @@ def centre_line(
         use = (s >= bounds[0]) & (s <= bounds[1]) & (weight > 0)
         if use.sum() < LEAST:
             break
-        curve = Curve.fit(bounds, s[use], voxels[use], weight[use])
+        found = Curve.fit(bounds, s[use], voxels[use], weight[use])
+        if found.astray(line) > reach:
+            break
+        curve = found
     return curve
 
 
