@@ -123,7 +123,9 @@ def state_labels(config: dict) -> dict[int, str]:
 
 
 def meso_names(config: dict) -> list[str]:
-    """`meso33`, `meso23`, `meso12`: from coarse to fine."""
+    """`meso33`, `meso23`, `meso12`: from coarse to fine.
+
+    Raises ConfigError where meso.sizes do not fall, or one is given twice."""
     sizes = config["meso"].get("sizes", NOMINAL_SIZES)
     if sorted(sizes, reverse=True) != list(sizes) or len(set(sizes)) != len(sizes):
         raise ConfigError(f"meso.sizes {sizes} must fall from coarse to fine")

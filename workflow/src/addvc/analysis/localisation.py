@@ -56,7 +56,10 @@ def localisation(points: np.ndarray, strain: np.ndarray, axis: int) -> dict:
 
 
 def shares(inside: np.ndarray, ratio: np.ndarray, known: np.ndarray, prefix: str) -> dict:
-    """Shares of the points that are `inside`, and of the strain that they hold."""
+    """Shares, as fractions, of the points that are `inside`, and of the strain that they hold.
+
+    inside, known (nx, ny, nz) bool; ratio (nx, ny, nz) of the strain to its mean over the known points;
+    prefix: of the names of both shares."""
     count = known.sum()
     return {
         f"{prefix}volume_share": float(inside.sum() / count),

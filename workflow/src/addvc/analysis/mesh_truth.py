@@ -55,7 +55,10 @@ class MeshTruth:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> "MeshTruth":
-        """From a file of `save_mesh_truth`, or of the user's making."""
+        """From a file of `save_mesh_truth`, or of the user's making.
+
+        Raises ConfigError where points, cells or displacement1 is missing, MeshError where the shapes
+        of these do not fit or a side of a quadratic tetrahedron is not straight."""
         with h5py.File(path) as file:
             missing = {"points", "cells", "displacement1"} - set(file)
             if missing:
@@ -73,7 +76,9 @@ class MeshTruth:
             )
 
     def displacement(self, points: np.ndarray, state: int) -> np.ndarray:
-        """u (q, 3) of reference points (q, 3): I_reference(x) = I_state(x + u(x))."""
+        """u (q, 3) of reference points (q, 3), voxels: I_reference(x) = I_state(x + u(x)).
+
+        Zero for state 0, the reference. Raises ConfigError where the truth has no such state."""
         if not 0 <= state <= len(self._u):
             raise ConfigError(
                 f"the truth has no state {state} (0 to {len(self._u)}); list as many states in "
@@ -216,7 +221,9 @@ def save_mesh_truth(
     strains: np.ndarray | None = None,
     platens: np.ndarray | None = None,
 ) -> None:
-    """Write the file that `MeshTruth.load` reads."""
+    """Write the file that `MeshTruth.load` reads: points (n, 3) and displacements (n, 3) in voxels, one
+    per loading state; cells (m, 4) or (m, 10); strains (states,); platens (states + 1, 2) in voxels, the
+    reference first. Raises MeshError as `MeshTruth.load` does."""
     _check(points, cells, displacements)
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         file["points"], file["cells"] = points, cells

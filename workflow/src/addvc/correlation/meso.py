@@ -80,7 +80,11 @@ def start_options(section: dict, size: float, axis: int, degree: int = DEGREE) -
 def meso_quadrature(
     mesh: Mesh, coefficients: np.ndarray, options: MesoOptions, most: float = np.inf
 ) -> Quadrature:
-    """A point of each voxel in tetrahedra where I_r is clear; one in stride**3 of more than `most`."""
+    """A point of each voxel in tetrahedra where I_r, by its spline coefficients (nx, ny, nz), is clear;
+    one in stride**3 of an image of more than `most` voxels, which weighs as many.
+
+    Raises CorrelationError where clear voxels are sought in a blank image, MeshError where no voxel
+    is left."""
     chosen = None
     if options.clear > 0:
         chosen = clear_voxels(coefficients, 1, options.clear, options.degree)
@@ -100,9 +104,12 @@ def meso_system(
     lines: list | None = None,
     most: float = np.inf,
 ) -> System:
-    """Eq. 9 with T = L on one mesh: I_r sampled at its voxels, and a solver of A = H + M.
+    """Eq. 9 with T = L on one mesh of n nodes: I_r, by its spline coefficients (nx, ny, nz), sampled at
+    its voxels (Q,), and a solver of A = H + M (3 n, 3 n).
 
-    `lines` are the grid lines of a hexahedral grid."""
+    `lines`: coordinates (k,), voxels, of the grid lines along x, y and z of a hexahedral grid, None for
+    tetrahedra; `most`: voxels from which on some are left out. Raises CorrelationError where A is not
+    positive definite, else as `meso_quadrature` does."""
     if lines is None:
         quadrature = meso_quadrature(mesh, coefficients, options, most)
     else:

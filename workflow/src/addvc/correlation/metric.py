@@ -91,7 +91,8 @@ def right_hand_side(reference: Reference, r: np.ndarray) -> np.ndarray:
 
 
 def residual_statistics(r: np.ndarray, inside: np.ndarray, weight: np.ndarray) -> dict:
-    """Weighted mean and standard deviation of r where it is known, and the points dropped."""
+    """Mean and standard deviation, weighted by weight (Q,), of residuals r (Q,), grey levels, where they
+    are known: inside (Q,) bool; nan where none is. `outside`: the number of points dropped."""
     kept, w = r[inside].astype(np.float64), weight[inside]
     if len(kept) == 0:
         return {"mean": float("nan"), "std": float("nan"), "outside": int((~inside).sum())}

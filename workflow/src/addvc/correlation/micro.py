@@ -64,7 +64,8 @@ def micro_options(section: dict, cell_size: float, axis: int) -> MicroOptions:
 def micro_reference(
     mesh: Mesh, coefficients: np.ndarray, shell: Quadrature | None = None, degree: int = DEGREE
 ) -> Reference:
-    """I_r at the four Gauss points of each tetrahedron, then at the points of a shell."""
+    """I_r, by its spline coefficients (nx, ny, nz), at the four Gauss points of each of m tetrahedra,
+    then at the s points of a shell, if any: Q = 4 m + s."""
     points = gauss_points(mesh) if shell is None else joined(gauss_points(mesh), shell)
     return reference_on(mesh, points, coefficients, degree)
 

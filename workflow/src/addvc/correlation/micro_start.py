@@ -79,7 +79,9 @@ def judged(judge: Judge, deformed: np.ndarray, u: np.ndarray) -> dict:
 def best_candidate(
     judge: Judge, deformed: np.ndarray, candidates: dict[str, np.ndarray]
 ) -> tuple[str, list[dict]]:
-    """The candidate {name: u (n, 3)} with the least score, and a row of figures for each."""
+    """The candidate {name: u (n, 3)} with the least score, and a row of figures for each.
+
+    Raises CorrelationError where no score is finite."""
     table = [{"candidate": name} | judged(judge, deformed, u) for name, u in candidates.items()]
     known = [row for row in table if np.isfinite(row["score"])]
     if not known:

@@ -1,5 +1,7 @@
 """Eq. 6, 7: a displacement rescaled along x, y and z by three Gauss-Newton unknowns."""
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 
@@ -14,8 +16,11 @@ def scaling_basis(w: np.ndarray) -> np.ndarray:
     return basis.reshape(-1, 3)
 
 
-def reduced_solve(hessian: sparse.spmatrix, basis: np.ndarray):
-    """Eq. 6: b -> d = R alpha with R^T H R alpha = R^T b, as a function to hand to Gauss-Newton."""
+def reduced_solve(
+    hessian: sparse.spmatrix, basis: np.ndarray
+) -> Callable[[np.ndarray], np.ndarray]:
+    """Eq. 6: b (3 n,) -> d (3 n,) = R alpha with R^T H R alpha = R^T b, as a function to hand to
+    Gauss-Newton; H (3 n, 3 n), R (3 n, 3) the basis."""
     small = basis.T @ (hessian @ basis)
     return lambda b: basis @ np.linalg.lstsq(small, basis.T @ b, rcond=1e-12)[0]
 

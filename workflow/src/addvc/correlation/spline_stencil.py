@@ -5,6 +5,8 @@ A matrix couples control points at most three apart along each axis, so it is ke
 matrix that treats the components alike as a scalar stencil (nx, ny, nz, 7, 7, 7).
 """
 
+from collections.abc import Callable
+
 import numba as nb
 import numpy as np
 
@@ -164,8 +166,8 @@ def add_scalar(stencil: np.ndarray, scalar: np.ndarray, weight: float) -> None:
         stencil[..., m] += weight * scalar
 
 
-def block_jacobi(stencil: np.ndarray):
-    """r -> D^-1 r, D being the 3 x 3 blocks of the diagonal."""
+def block_jacobi(stencil: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """r -> D^-1 r, both (nx, ny, nz, 3), D being the 3 x 3 blocks of the diagonal."""
     block = stencil[:, :, :, 3, 3, 3][..., [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
     inverse = np.linalg.inv(block)
     return lambda r: np.einsum("ijkab,ijkb->ijka", inverse, r)

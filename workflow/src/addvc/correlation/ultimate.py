@@ -29,8 +29,11 @@ def fft_shift(volume: np.ndarray, shift: Sequence[float]) -> np.ndarray:
     return np.ascontiguousarray(fft.irfftn(spectrum, volume.shape), dtype=np.float32)
 
 
-def shift_error(system: System, moved: np.ndarray, shift: float, start: np.ndarray, stop: Stop):
-    """The solution (n, 3) for an image moved by (shift, shift, shift), and its error in figures."""
+def shift_error(
+    system: System, moved: np.ndarray, shift: float, start: np.ndarray, stop: Stop
+) -> tuple[np.ndarray, dict]:
+    """u (n, 3) from `start` (n, 3) for an image moved by (shift, shift, shift), given by its spline
+    coefficients (nx, ny, nz), and its error: bias and standard deviation over all components. Voxels."""
     solution = register(system, moved, start, stop, f"shift {shift}")
     miss = solution.u - shift
     return solution.u, {
@@ -73,7 +76,10 @@ def ultimate_error(
 
 def with_noise(system: System, coefficients: np.ndarray, noise: Noise, rows: list[dict]) -> dict:
     """The standard deviation found with noise, and the two that were to be expected: of noise as the
-    images have it, and of white noise of the same deviation at the points. All in voxels."""
+    images have it, and of white noise of the same deviation at the points. All in voxels; the noise of
+    the voxels and at the points in grey levels.
+
+    coefficients (nx, ny, nz) of the image; rows of `shift_error` with noise, one per shift."""
     reference = system.reference
     field = noise.volume(coefficients.shape, np.random.default_rng(SEED))
     sigma = float(spline_value(field, reference.quadrature.points, reference.degree)[0].std())

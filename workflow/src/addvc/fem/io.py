@@ -31,7 +31,8 @@ def write_vtu(
 
 
 def read_vtu(path: str | Path) -> tuple[np.ndarray, np.ndarray, dict, dict]:
-    """Points, cells, point data and cell data of a file of `write_vtu`."""
+    """Of a file of `write_vtu`: points (n, 3) in voxels, cells (m, 2 | 3 | 4 | 8), fields by name:
+    (n, ...) on points, (m, ...) on cells."""
     grid = meshio.read(path)
     cell_data = {name: values[0] for name, values in grid.cell_data.items()}
     return grid.points, grid.cells[0].data, dict(grid.point_data), cell_data

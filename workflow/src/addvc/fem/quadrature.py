@@ -158,7 +158,10 @@ def locate_in_lattice(lines: list[np.ndarray], points: np.ndarray) -> tuple[np.n
 def lattice_points(
     lines: list[np.ndarray], image_shape: tuple[int, int, int], stride: int = 1
 ) -> Quadrature:
-    """Voxel centres inside a rectilinear hexahedral grid, weights as in `voxel_points`."""
+    """Voxel centres (Q, 3) inside a rectilinear hexahedral grid, shape functions (Q, 8), weights as in
+    `voxel_points`, stride**3 voxels.
+
+    `lines`: rising coordinates (k,), voxels, of the grid lines along x, y and z."""
     spans = [
         np.arange(max(0, int(np.ceil(line[0]))), min(size - 1, int(line[-1])) + 1.0, stride)
         for line, size in zip(lines, image_shape, strict=True)

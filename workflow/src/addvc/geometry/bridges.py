@@ -17,7 +17,7 @@ from addvc.geometry.centre_line import Curve, along, arc_length
 from addvc.geometry.lines import SPACING
 from addvc.geometry.region import Region
 from addvc.geometry.sections import TRIMMED, GreyStruts, cut_depth, grey_struts, sections_of, within
-from addvc.geometry.skeleton import FREE_END, StrutGraph
+from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
 from addvc.geometry.stuffing import NECK
 from addvc.geometry.surface import CAP_SLOPE
 
@@ -78,7 +78,7 @@ def wanted_gaps(struts: GreyStruts, solid: np.ndarray, region: Region) -> list[G
     return [gap for gap in gaps if gap is not None]
 
 
-def leads_on(branch, graph: StrutGraph, region: Region) -> bool:
+def leads_on(branch: Branch, graph: StrutGraph, region: Region) -> bool:
     """Whether a branch ends at junctions, or where the region cuts it."""
     tips = np.array([branch.points[k] for k, end in zip((0, -1), branch.ends, strict=True)
                      if end == FREE_END]).reshape(-1, 3)  # fmt: skip

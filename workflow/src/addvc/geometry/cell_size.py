@@ -4,13 +4,14 @@ import numpy as np
 from scipy import fft, ndimage
 
 from addvc.errors import GeometryError
+from addvc.images.specimen import Specimen
 
 LARGEST_BOX = 200  # voxels: a larger one says nothing more, and its FFT would take gigabytes
 PLATEN_MARGIN = 3.0
 REACH = 0.6  # of the smallest side: longer shifts have few pairs of voxels
 
 
-def central_box(specimen, shape: tuple[int, int, int]) -> tuple[slice, slice, slice]:
+def central_box(specimen: Specimen, shape: tuple[int, int, int]) -> tuple[slice, slice, slice]:
     """The box around the specimen without its platens, its centre if over 200 voxels wide."""
     low, high = np.zeros(3), np.array(shape) - 1.0
     low[specimen.axis] = specimen.low + PLATEN_MARGIN
@@ -72,7 +73,7 @@ def secondary_peak(radius: np.ndarray, curve: np.ndarray) -> float:
     return float(radius[top] + 0.5 * (before - after) / (before - 2 * at + after))
 
 
-def measure_cell_size(volume: np.ndarray, specimen, setting: str | float) -> dict:
+def measure_cell_size(volume: np.ndarray, specimen: Specimen, setting: str | float) -> dict:
     """The cell size in voxels ("auto": measured; a number: given) and the curve of Fig. 4.
 
     Raises GeometryError when it must be measured and there is no secondary peak."""

@@ -3,10 +3,11 @@
 import numpy as np
 
 from addvc.fem.mesh import Mesh
+from addvc.images.specimen import Specimen
 
 
 def grid_lines(
-    shape: tuple[int, int, int], specimen, across: int, along: int, platen: float
+    shape: tuple[int, int, int], specimen: Specimen, across: int, along: int, platen: float
 ) -> list[np.ndarray]:
     """Grid lines: `across` cells over each width, `along` over the specimen, one in each platen.
 
@@ -27,7 +28,11 @@ def grid_lines(
 
 
 def hex_grid(lines: list[np.ndarray]) -> Mesh:
-    """Hexahedra between three sets of grid lines, numbered with the last axis fastest."""
+    """Hexahedra (m, 8) between three sets of grid lines, numbered with the last axis fastest; points
+    (n, 3), likewise.
+
+    `lines`: coordinates (k,), voxels, of those along x, y and z: n is the product of all k, m that of
+    all k - 1."""
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape([len(line) for line in lines])
     corner = [

@@ -13,6 +13,7 @@ from scipy.spatial import Delaunay
 
 from addvc.errors import MeshError
 from addvc.fem.mesh import Mesh, mean_edge_length, oriented
+from addvc.images.specimen import Specimen
 
 TRIALS = (0.85, 0.9, 0.8, 0.95, 0.75, 1.0, 0.7, 1.05, 0.65, 1.1, 0.6)  # spacing over mean edge
 NEAR = 0.03
@@ -63,7 +64,7 @@ def extruded(section: np.ndarray, triangles: np.ndarray, levels: np.ndarray, axi
     return oriented(Mesh(points, np.vstack([np.column_stack(cell) for cell in cells])))
 
 
-def specimen_mesh(specimen, spacing: float) -> Mesh:
+def specimen_mesh(specimen: Specimen, spacing: float) -> Mesh:
     """Tetrahedra of a specimen with points some `spacing` voxels apart."""
     if specimen.kind == "cylinder":
         section, triangles = disc_section(specimen.radius, spacing)
@@ -75,7 +76,7 @@ def specimen_mesh(specimen, spacing: float) -> Mesh:
     return extruded(section, triangles, levels, specimen.axis)
 
 
-def meso_mesh(specimen, size: float, margin: float = 0.0) -> Mesh:
+def meso_mesh(specimen: Specimen, size: float, margin: float = 0.0) -> Mesh:
     """Tetrahedra of the specimen whose mean edge is nearest to `size` voxels (Table 2's size), its
     end faces `margin` voxels away from the platens.
 

@@ -20,11 +20,13 @@ log = logging.getLogger(__name__)
 def micro_mesh(
     grey: np.ndarray, gamma: float, surface: Surface, region: Region, options: dict
 ) -> tuple[Mesh, dict]:
-    """Tetrahedra of {grey > gamma} in one piece, and the figures of the mesh.
+    """Tetrahedra (m, 4) of {grey > gamma}, grey (nx, ny, nz), in one piece, and the figures of the mesh,
+    lengths in voxels.
 
-    `options` is the `mesh` section of the configuration; `mend: prune` cuts dangling stubs off.
-    Raises MeshError when the largest piece holds less than `min_kept` of the volume, or a cell is
-    inverted or too flat."""
+    `surface`: the level set gamma, which pytetwild meshes the inside of and the mesh is compared with.
+    `options` is the `mesh` section of the configuration; `mend: prune` cuts dangling stubs off. Raises
+    MeshError when there is no cell, when the largest piece holds less than `min_kept` of the volume, or
+    a cell is inverted or too flat."""
     mesh = meshed(grey, gamma, surface, options)
     whole = np.abs(cell_volumes(mesh)).sum() if len(mesh.cells) else 0.0
     if whole == 0:

@@ -6,6 +6,7 @@ import numpy as np
 
 from addvc.errors import GeometryError
 from addvc.fem.mesh import Mesh, boundary_faces
+from addvc.images.specimen import Specimen
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Region:
     cut_sides: bool = False
 
 
-def micro_region(specimen, setting, margin: float = 3.0) -> Region:
+def micro_region(specimen: Specimen, setting, margin: float = 3.0) -> Region:
     """Region of `micro.region`: "all" (up to `margin` voxels from platens or image ends), or a dict
     {low, high, radius}, any of them left out for the whole.
 

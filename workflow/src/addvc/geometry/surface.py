@@ -43,7 +43,8 @@ def capped(grey: np.ndarray, gamma: float, region: Region, contrast: float) -> n
 
 
 def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]:
-    """Bring all but the largest face-connected solid of `grey` below gamma; what was dropped.
+    """`grey` (nx, ny, nz) with all but its largest face-connected solid brought below gamma, a copy, and
+    what was dropped.
 
     Raises GeometryError when there is no solid."""
     label, count = ndimage.label(grey > gamma)
@@ -65,9 +66,11 @@ def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]
 def region_solid(
     smooth: np.ndarray, levels: dict, region: Region, min_kept: float
 ) -> tuple[np.ndarray, dict]:
-    """Grey levels of the region's largest solid, all else below gamma; `levels`: `find_threshold`.
+    """Grey levels (nx, ny, nz) of the region's largest solid, all else below gamma, from the blurred
+    ones, `smooth` (nx, ny, nz), and what fell out; `levels`: `find_threshold`.
 
-    Warns when over 10 % of the solid falls out; GeometryError when less than `min_kept` stays."""
+    Warns when over 10 % of the solid falls out. Raises GeometryError when there is none, or less than
+    `min_kept` of it (0..1) stays."""
     gamma, contrast = levels["threshold"], levels["solid"] - levels["void"]
     grey, figures = largest_component(capped(smooth, gamma, region, contrast), gamma)
     kept = figures["kept_fraction"]
@@ -88,7 +91,8 @@ def region_solid(
 
 
 def marching_cubes(grey: np.ndarray, gamma: float) -> Surface:
-    """The level set `gamma` of a volume as triangles, wound outwards, vertices clamped on edges."""
+    """The level set `gamma` of grey levels (nx, ny, nz): points (n, 3) in voxels and triangles (f, 3),
+    wound outwards, vertices clamped on edges."""
     padded = np.pad(grey, 1, constant_values=gamma - 1)
     points, faces, _, _ = measure.marching_cubes(padded, gamma, gradient_direction="descent")
     base = np.floor(points)

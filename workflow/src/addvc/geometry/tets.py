@@ -8,6 +8,7 @@ here. It never gives the same mesh twice (`geometry/meso.py` says why).
 import contextlib
 import os
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ class TetOptions:
 
 
 @contextlib.contextmanager
-def scratch_folder():
+def scratch_folder() -> Iterator[None]:
     """Run in a temporary folder: the mesher leaves files in the current one."""
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:

@@ -51,10 +51,10 @@ def bisect_threshold(
 
 
 def check_contrast(grey: np.ndarray, gamma: float) -> dict:
-    """Medians of void and solid and the noise of the void, of grey levels (n,); GeometryError if gamma
-    is in the noise.
+    """Medians of void and solid and the noise of the void, of grey levels (n,), in grey levels.
 
-    The noise is 1.48 times the median absolute deviation of what is below gamma."""
+    The noise is 1.48 times the median absolute deviation of what is below gamma. Raises GeometryError
+    where gamma leaves no void or no solid, or is less than twice the noise above the void."""
     void, solid = grey[grey < gamma], grey[grey >= gamma]
     if len(void) == 0 or len(solid) == 0:
         raise GeometryError(

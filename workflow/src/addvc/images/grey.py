@@ -52,7 +52,7 @@ def grey_levels(volume: np.ndarray, axis: int) -> Levels:
 
 
 def matched(volume: np.ndarray, levels: Levels, wanted: Levels) -> np.ndarray:
-    """The volume with its two levels moved to those wanted: a I + b, float32.
+    """The volume (nx, ny, nz) with its two levels moved to those wanted: a I + b, float32.
 
     Raises ScanError where the contrast is below a fifth of, or over five times, that wanted."""
     ratio = levels.contrast / wanted.contrast

@@ -65,7 +65,10 @@ def _sum_along(volume: NDArray, factor: int, axis: int) -> NDArray[np.float32]:
 
 
 def pyramid(volume: NDArray, levels: int) -> list[NDArray[np.float32]]:
-    """`levels` images, the finest first; each next one is the previous one binned by 2."""
+    """`levels` images of a volume (nx, ny, nz), the finest first; each next one is the previous one
+    binned by 2.
+
+    Raises ScanError for less than one level, or when an image to be binned is one voxel wide."""
     if levels < 1:
         raise ScanError(f"a pyramid of {levels} levels is empty; use at least 1")
     images = [np.asarray(volume, dtype=np.float32)]

@@ -64,7 +64,11 @@ class Scan:
         return "xyz".index(self.axes[0])
 
     def slab(self, start: int, stop: int) -> NDArray:
-        """Slices start to stop along the slow axis, as (x, y, z); only these are read."""
+        """Slices start to stop along the slow axis, as (x, y, z); only these are read.
+
+        Raises ScanError when they are none, or not all within the scan; also for a TIFF page that
+        turns out to be damaged.
+        """
         n = self.shape[self.slow_axis]
         if not 0 <= start < stop <= n:
             raise ScanError(f"{self.path}: slab {start} to {stop} is not within 0 to {n} slices")
@@ -138,7 +142,11 @@ def crop_bounds(shape: Sequence[int], crop: Crop) -> list[tuple[int, int]]:
 
 
 def binned_shape(scan: Scan, factor: int, crop: Crop) -> tuple[int, ...]:
-    """Size of the cropped and binned image; at least 16 voxels in each direction."""
+    """Size (nx, ny, nz) of the cropped and binned image, in its voxels.
+
+    Raises ScanError when `factor` is not a whole number of at least 1, the crop leaves the scan or
+    keeps nothing of it, or less than 16 voxels remain in a direction.
+    """
     if isinstance(factor, bool) or factor != int(factor) or factor < 1:
         raise ScanError(f"bin is {factor}; use a whole number of at least 1")
     shape = tuple((stop - start) // int(factor) for start, stop in crop_bounds(scan.shape, crop))

@@ -62,7 +62,11 @@ def natural_key(name: str) -> list[tuple[int, int | str]]:
 
 
 def open_raw(path: Path, fmt: ScanFormat) -> Source:
-    """A headerless array: header_bytes, then product(shape) values of `dtype`."""
+    """A headerless array: header_bytes, then product(shape) values of `dtype`.
+
+    Raises ScanError when shape or dtype is missing or impossible, byte_order unknown or header_bytes
+    negative, or when the file is not exactly as long as they say.
+    """
     if fmt.shape is None or fmt.dtype is None:
         raise ScanError(
             f"{path}: a {path.suffix} file does not say what it holds; give scans.shape (three "
@@ -119,7 +123,10 @@ def _check_raw_size(path: Path, fmt: ScanFormat, shape: tuple[int, ...], dtype: 
 
 
 def open_npy(path: Path, fmt: ScanFormat) -> Source:
-    """An array saved by numpy, memory-mapped slab by slab."""
+    """An array saved by numpy, memory-mapped slab by slab.
+
+    Raises ScanError when the file holds none, or is truncated.
+    """
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError) as error:
@@ -134,7 +141,11 @@ def open_npy(path: Path, fmt: ScanFormat) -> Source:
 
 
 def open_hdf5(path: Path, fmt: ScanFormat) -> Source:
-    """A dataset of an HDF5 file; `dataset` may be left out when there is one volume only."""
+    """A dataset of an HDF5 file; `dataset` may be left out when there is one volume only.
+
+    Raises ScanError when the file cannot be read, has no such dataset, or none is named and it does
+    not hold exactly one volume.
+    """
     try:
         with h5py.File(path, "r") as file:
             name = fmt.dataset or _only_volume(path, file)

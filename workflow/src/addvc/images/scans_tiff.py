@@ -35,7 +35,9 @@ def open_stack(files: Sequence[Path], name: str, every_slice: bool = True) -> So
     """Single-page TIFF files, sorted by the numbers in their names, one slice each.
 
     name: what the user wrote (a folder or a pattern), for the messages. every_slice: open each, not
-    the first and last alone (1,654 slices take half a second on a local disk).
+    the first and last alone (1,654 slices take half a second on a local disk). Raises ScanError when
+    there is no file, a number is missing between two, or a file that is opened is truncated, not one
+    grey slice, or differs from the first in size or type.
     """
     files = tuple(sorted(files, key=lambda file: natural_key(file.name)))
     if not files:

@@ -166,7 +166,12 @@ def _box(
 
 
 def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> tuple[float, float]:
-    """Coordinates of both platen faces, or of the ends of the image, checked."""
+    """Coordinates (low, high) of both platen faces of an image (nx, ny, nz), or of its ends, in voxels.
+
+    platens: as in `find_specimen`. Raises GeometryError when it is none of these, when given
+    coordinates are reversed or leave the image, when 'auto' finds platens along another axis only, or
+    when less than 8 rows lie between the faces.
+    """
     n = volume.shape[axis]
     low, high = -0.5, n - 0.5
     if not isinstance(platens, str):

@@ -1,7 +1,7 @@
 """Methods to paste into a paper, with references, from the configuration and the numbers."""
 
 from addvc.config import chooses, loading_axis, micro_names
-from addvc.correlation.micro import micro_options
+from addvc.correlation.micro import MicroOptions, micro_options
 from addvc.report import style
 from addvc.report.references import Citations
 
@@ -116,7 +116,7 @@ def micro(summary: dict, config: dict) -> str:
     )
 
 
-def functional(method: str, section: dict, options, cutoffs: list[float]) -> str:
+def functional(method: str, section: dict, options: MicroOptions, cutoffs: list[float]) -> str:
     """What a method of micro DVC minimises; `cutoffs`: l_E of every state (voxels)."""
     if method == "eq10":
         return (

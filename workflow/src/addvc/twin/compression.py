@@ -76,7 +76,10 @@ def record(structure: Structure, found: Equilibrium, strain: float) -> LoadStep:
 def load_step(
     structure: Structure, motion: Motion, tangent: Tangent | None, move: float, halvings: int = 0
 ) -> Equilibrium:
-    """Equilibrium after the upper platen came down by `move` (voxels); halved where none is found."""
+    """Equilibrium after the upper platen came down by `move` (voxels); halved where none is found.
+
+    halvings: how often the step has been halved already. Raises EquilibriumError where one halved four
+    times still has no equilibrium, or no damping holds the network."""
     tangent = near(structure, motion, tangent)
     found = descend(structure, predict(structure, motion, tangent, move), tangent)
     if found.reached:

@@ -59,7 +59,10 @@ def compact(nodes: np.ndarray, edges: np.ndarray, *more: np.ndarray) -> tuple[np
 
 
 def collapse(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge the ends of edges shorter than SHORT times the mean into their centroid."""
+    """Merge the ends of edges shorter than SHORT times the mean into their centroid.
+
+    nodes (n, 3) in voxels, edges (e, 2) -> those left, renumbered.
+    """
     length = edge_length(nodes, edges)
     short = edges[length < SHORT * length.mean()]
     n = len(nodes)
@@ -71,7 +74,10 @@ def collapse(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def smooth(nodes: np.ndarray, edges: np.ndarray, passes: int = 3) -> np.ndarray:
-    """Laplacian smoothing: each node goes half-way to the mean of its neighbours."""
+    """Laplacian smoothing: each node goes half-way to the mean of its neighbours, `passes` times.
+
+    nodes (n, 3), edges (e, 2) -> nodes (n, 3).
+    """
     both = np.r_[edges, edges[:, ::-1]]
     degree = np.bincount(both[:, 0], minlength=len(nodes))[:, None]
     for _ in range(passes):
@@ -125,7 +131,11 @@ def exit_share(a: np.ndarray, b: np.ndarray, body: Specimen) -> tuple[np.ndarray
 
 
 def clip(nodes: np.ndarray, edges: np.ndarray, body: Specimen) -> Skeleton:
-    """Cut the edges that leave the specimen; each cut end is a node of its own."""
+    """Cut the edges that leave the specimen; each cut end is a node of its own.
+
+    nodes (n, 3) in voxels, edges (e, 2). Edges without an end inside fall out, and so do those of
+    which no more than SNAP is left.
+    """
     nodes, kind = snap(nodes, body)
     inside = body.inside(nodes) & (kind == JUNCTION)
     on_platen = (kind != JUNCTION) & (np.hypot(*(nodes - body.centre)[:, ::2].T) < body.radius)
@@ -168,7 +178,10 @@ def drop_touching(skeleton: Skeleton) -> Skeleton:
 
 
 def largest_component(skeleton: Skeleton) -> Skeleton:
-    """The largest connected part; it must reach both platens."""
+    """The largest connected part of nodes (n, 3) and edges (s, 2), renumbered.
+
+    Raises ValueError where less than three of its struts reach one of the platens.
+    """
     n = len(skeleton.nodes)
     graph = coo_array((np.ones(len(skeleton.edges)), skeleton.edges.T), shape=(n, n))
     _, part = connected_components(graph, directed=False)

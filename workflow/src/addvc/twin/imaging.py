@@ -49,7 +49,7 @@ def radius_map(planes: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def cupping(radius: np.ndarray, depth: float) -> np.ndarray:
-    """Factor 1 - depth on the axis, 1 at the side: beam hardening."""
+    """Factor 1 - depth on the axis, 1 at the side: beam hardening; radius (n, nz) of `radius_map`."""
     return (1 - depth * np.clip(1 - radius**2, 0, 1)).astype(np.float32)
 
 
@@ -67,7 +67,9 @@ def add_rings(grey: np.ndarray, radius: np.ndarray, profile: np.ndarray) -> None
 
 
 def noise(options: TwinOptions, state: int, lo: int, hi: int, shape: tuple[int, ...]) -> np.ndarray:
-    """Correlated noise of unit deviation on planes [lo, hi); each plane has its own seed."""
+    """Correlated noise (hi - lo, ny, nz) of unit deviation, float32, on the planes [lo, hi) along x of a
+    scan of `shape` (nx, ny, nz), scan voxels; each plane has its own seed.
+    """
     margin = int(TRUNCATE * GRAIN + 0.5)
     planes = [
         np.random.default_rng([options.seed, 4, state, margin + i]).standard_normal(
@@ -91,7 +93,9 @@ def brightness(options: TwinOptions, state: int) -> float:
 
 
 def store_as(grey: np.ndarray, dtype: str) -> np.ndarray:
-    """Grey levels in the scan's data type."""
+    """Grey levels (any shape) in the scan's data type: times GREY_SCALE, rounded and clipped to what it
+    holds, unless it is float32.
+    """
     if dtype == "float32":
         return grey.astype(np.float32)
     return np.clip(np.rint(grey * GREY_SCALE[dtype]), 0, np.iinfo(dtype).max).astype(dtype)

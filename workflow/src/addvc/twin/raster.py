@@ -71,7 +71,10 @@ def solid_fraction(network: Network) -> float:
 
 
 def fit_radius(network: Network, fraction: float, tolerance: float = 0.003) -> Network:
-    """Scale all radii so that the solid fraction is met (relative tolerance): secant in logs."""
+    """Scale all radii so that the solid fraction is met (relative tolerance): secant in logs.
+
+    Raises ValueError where eight steps do not meet it.
+    """
     length = network.nodes[network.elements]
     volume = np.pi * network.body.radius**2 * network.body.height
     total = np.linalg.norm(length[:, 1] - length[:, 0], axis=1) @ (network.radii**2).mean(axis=1)

@@ -50,7 +50,10 @@ class Truth:
         return cls(load_foam(path), load_motions(path), load_strains(path))
 
     def displacement(self, points: np.ndarray, state: int) -> np.ndarray:
-        """u (n, 3) of reference points (n, 3): I_reference(x) = I_state(x + u(x))."""
+        """u (n, 3) of reference points (n, 3), voxels: I_reference(x) = I_state(x + u(x)).
+
+        Raises ValueError where there is no such state (0: the reference), or points are not (n, 3).
+        """
         points = _as_points(points)
         if not 0 <= state < len(self.motions):
             raise ValueError(f"state {state} is outside 0 to {len(self.motions) - 1}")

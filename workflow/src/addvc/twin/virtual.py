@@ -50,7 +50,9 @@ class VirtualField:
         return v
 
     def displacement(self, points: np.ndarray, state: int) -> np.ndarray:
-        """u (n, 3) at points (n, 3) of the reference: u = v(x + u)."""
+        """u (n, 3) at points (n, 3) of the reference, voxels: u = v(x + u).
+
+        Raises ConfigError where 200 iterations do not settle: the field folds the image."""
         u = np.zeros_like(points, dtype=float)
         for _ in range(200):
             new = self.pulled_back(points + u, state)
