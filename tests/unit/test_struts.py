@@ -21,6 +21,7 @@ from addvc.analysis.strut_table import (
     GEOMETRY,
     MECHANICS,
     MESO,
+    RAW,
     UNDECIDED,
     Measured,
     described,
@@ -500,6 +501,20 @@ def test_struts_with_doubtful_nodes_or_a_neck_are_flagged(cut, lattice):
     table = table_under(struts, points, 0.01 * points, valid)
     assert table["valid"] == [1, 0, 0]
     assert table["whole"] == [1, 1, 0]
+
+
+def test_a_strut_far_from_equilibrium_is_flagged(cut, lattice):
+    """One that lies on another: no residual tells. Where nothing was balanced none is."""
+    struts, points = cut[0], lattice[2].points
+    rng, valid = np.random.default_rng(2417), np.ones(len(points))
+    balanced = 0.01 * points
+    measured = balanced + rng.normal(0, 0.1, points.shape)
+    measured[struts[1].nodes] += 2.0
+    fields = {"": Measured(points, balanced), RAW: Measured(points, measured)}
+    flagged = np.flatnonzero(np.array(strut_table(struts, fields, valid, NU)["valid"]) == 0)
+    assert_array_equal(flagged, [1])
+    fields = {"": Measured(points, measured), RAW: Measured(points, measured)}
+    assert all(strut_table(struts, fields, valid, NU)["valid"])
 
 
 def table_of(energies, valid=None):
