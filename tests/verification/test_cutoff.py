@@ -4,14 +4,20 @@ import numpy as np
 import pytest
 
 from addvc.config import chooses
-from addvc.correlation.corotational import Stage, corotational, stage_system
+from addvc.correlation.corotational import (
+    Mending,
+    Stage,
+    corotational,
+    stage_system,
+    with_cutoff,
+)
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial_of
 from addvc.correlation.metric import hessian
 from addvc.correlation.micro import ladder
 from addvc.correlation.register import Stop, register
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.assembly import node_pattern
-from verification.frame import image, rms_error
+from verification.frame import CORNERS, image, rms_error
 
 NOISE = 1.5
 LADDER = Ladder(Noise(NOISE, 0.0), shortest=-4, longest=3)
@@ -84,6 +90,20 @@ def test_the_choice_is_close_to_the_best_of_the_ladder(problem, period):
     solution, notes = corotational(problem, deformed, start, PLAN, ladder=LADDER)
     assert rms_error(solution.u, truth) < 1.15 * min(errors)
     assert notes["l_e"] / problem.cutoff == pytest.approx((notes["c"] / problem.weight) ** 0.5)
+
+
+def test_a_lost_strut_does_not_ask_for_a_short_length(problem):
+    """In a frame at rest, one strut so far off that it stays there: what it needs is no l_E."""
+    points = problem.reference.mesh.points
+    deformed, middle = image(lambda x: x, 31), (CORNERS[1] + CORNERS[2]) / 2
+    bump = np.exp(-np.sum((points - middle) ** 2, axis=1) / (2 * 5.0**2))
+    start = 8 * bump[:, None] * np.array([0.0, 0.6, 0.8])
+    stage, mending = Stage(True, None, Stop(1e-2, 10)), Mending(2, 6.0, most=0.5)
+    lengths = [
+        with_cutoff(problem, deformed, start, stage, LADDER, given)[0].cutoff
+        for given in (None, mending)
+    ]
+    assert lengths[1] > 2 * lengths[0]
 
 
 def test_a_given_length_is_not_chosen():
