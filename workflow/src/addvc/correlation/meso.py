@@ -204,14 +204,14 @@ def with_cutoff(
         return solution, 1.0, trials
     times = RATIO**rung
     stop = replace(stop, max_iterations=min(ONCE_MORE, stop.max_iterations))
-    found = register(scaled(system, times), deformed, solution.u, stop, f"l_L times {times:.2g}")
+    found = register(cut_off(system, times), deformed, solution.u, stop, f"l_L times {times:.2g}")
     if not found.converged:
         return solution, 1.0, trials
     history, seconds = solution.history + found.history, solution.seconds + found.seconds
     return replace(found, history=history, seconds=seconds), times, trials
 
 
-def scaled(system: System, times: float) -> System:
+def cut_off(system: System, times: float) -> System:
     """The system with `times` the cut-off: the Laplacian goes with its square."""
     extra = times**2 * system.regularisation
     h = hessian(system.reference, node_pattern(system.reference.mesh))
