@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from addvc.correlation import freeform as module
 from addvc.correlation.clear import clear_points
 from addvc.correlation.freeform import (
     LEVELS,
@@ -149,6 +150,14 @@ def test_a_smooth_field_is_found(speckle):
     left = error(freeform(*images, OPTIONS), points, truth)
     print(f"rms {left:.3f} voxel of {rms(truth):.2f}")
     assert left < 0.02
+
+
+def test_of_a_large_image_not_every_voxel_takes_part(speckle, monkeypatch):
+    volume, shift = speckle((64, 72, 60)), (0.3, -0.4, 0.6)
+    monkeypatch.setattr(module, "MOST", volume.size / 8)
+    grid, solution, table = freeform(volume, fft_shift(volume, shift), OPTIONS)
+    assert table[-1]["points"] < 0.2 * volume.size
+    assert error((grid, solution, table), inner(volume.shape, 8), shift) < 0.02
 
 
 def test_threads_change_nothing(speckle, with_one_and_two_threads):

@@ -47,3 +47,8 @@ def clear_points(
 def lattice(shape: tuple[int, int, int], stride: int) -> list[np.ndarray]:
     """Coordinates of every `stride`-th voxel centre along each axis."""
     return [np.arange(stride // 2, n, stride, dtype=float) for n in shape]
+
+
+def thinning(voxels: int, most: float) -> int:
+    """The stride that leaves at most some `most` of so many voxels."""
+    return max(1, int(np.ceil((voxels / most) ** (1 / 3))))

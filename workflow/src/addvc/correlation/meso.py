@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import sparse
 
-from addvc.correlation.clear import clear_voxels
+from addvc.correlation.clear import clear_voxels, thinning
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial_of
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.meso_start import chosen_register
@@ -90,11 +90,6 @@ def meso_quadrature(
         chosen = clear_voxels(coefficients, 1, options.clear, options.degree)
     stride = thinning(coefficients.size, most)
     return voxel_points(mesh, coefficients.shape, stride, chosen, dithered=True)
-
-
-def thinning(voxels: int, most: float) -> int:
-    """The stride that leaves at most some `most` of so many voxels."""
-    return max(1, int(np.ceil((voxels / most) ** (1 / 3))))
 
 
 def meso_system(
