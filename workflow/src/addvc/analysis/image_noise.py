@@ -7,7 +7,7 @@ are in it as they are in the residual; partial volumes of struts that turn are n
 
 import numpy as np
 
-from addvc.geometry.threshold import far_void, robust_deviation, specimen_mask
+from addvc.geometry.threshold import far_void, robust_deviation, some_centres, specimen_mask
 from addvc.images.specimen import Specimen
 from addvc.images.spline import DEGREE, spline_value
 
@@ -32,11 +32,10 @@ def pair_noise(
     The splines of Eq. 4 are taken at random places within the voxels, each of its own, as those of
     the quadrature are; 1.48 times the median absolute deviation."""
     mask = specimen_mask(reference.shape, specimen)
-    void = np.flatnonzero(mask & far_void(reference, gamma) & far_void(deformed, gamma))
-    if len(void) < LEAST * mask.sum() or not len(void):
+    void = mask & far_void(reference, gamma) & far_void(deformed, gamma)
+    if void.sum() < LEAST * mask.sum() or not void.any():
         return None
-    void = void[:: -(-len(void) // MOST)]
-    centres, rng = np.stack(np.unravel_index(void, mask.shape), axis=1), np.random.default_rng(SEED)
+    centres, rng = some_centres(void, MOST), np.random.default_rng(SEED)
     here, there = (
         spline_value(image, centres + rng.uniform(-0.5, 0.5, centres.shape), degree)
         for image in (reference, deformed)

@@ -89,13 +89,20 @@ def void_noise(
     spline of this degree at random places in them, which smooths it.
 
     None where less than 1 % of the mask (nx, ny, nz) is that far."""
-    void = np.flatnonzero(mask & far_void(smooth, gamma))
-    if len(void) < 0.01 * mask.sum():
+    void = mask & far_void(smooth, gamma)
+    if void.sum() < 0.01 * mask.sum():
         return None
-    centres = np.stack(np.unravel_index(void[:: -(-len(void) // MOST)], mask.shape), axis=1)
+    centres = some_centres(void, MOST)
     places = centres + np.random.default_rng(SEED).uniform(-0.5, 0.5, centres.shape)
     value, inside = spline_value(smooth, places, degree)
-    return robust_deviation(smooth.ravel()[void]), robust_deviation(value[inside])
+    return robust_deviation(smooth[void]), robust_deviation(value[inside])
+
+
+def some_centres(chosen: np.ndarray, most: int) -> np.ndarray:
+    """Centres (q, 3) of the voxels that are chosen (nx, ny, nz), at most `most`, evenly thinned out."""
+    index = np.flatnonzero(chosen)
+    step = max(1, -(-len(index) // most))
+    return np.stack(np.unravel_index(index[::step], chosen.shape), axis=1)
 
 
 def robust_deviation(x: np.ndarray) -> float:
