@@ -222,7 +222,8 @@ def test_noise_alone_has_no_energy_and_a_clear_motion_keeps_its_own():
     for curvature in (0.0, 0.05):
         fits = noisy(strut, before, placed(s, across, curvature), 60)
         values = np.array([fit.coefficients for fit in fits])
-        variances = prior_variances(values, np.array([fit.noise for fit in fits]))
+        areas = np.full(len(fits), strut.area.mean())
+        variances = prior_variances(values, np.array([fit.noise for fit in fits]), areas)
         kept = np.mean([strut_energy(strut, fit, NU, variances).energies for fit in fits], axis=0)
         raw = np.mean([strut_energy(strut, fit, NU).energies for fit in fits], axis=0)
         energies.append((kept, raw))
@@ -237,6 +238,17 @@ def test_the_spread_of_a_foam_is_found_behind_the_noise():
     square = rng.normal(0, np.sqrt(1.5**2 + noise)) ** 2
     assert_allclose(spread(square, noise), 1.5**2, rtol=0.1)
     assert spread(np.zeros(9), np.ones(9)) <= 1e-30
+
+
+def test_struts_that_share_loads_tell_the_same_whatever_their_areas():
+    """Stretch and curvature as one over the area: the prior of all struts is that of each half."""
+    rng = np.random.default_rng(2417)
+    areas = np.repeat([4.0, 16.0], 4000)
+    noise = np.eye(8) / areas[:, None, None] ** 2
+    values = rng.normal(0, np.sqrt(1 + 1.5**2), (len(areas), 8)) / areas[:, None]
+    for part in (slice(None), areas < 9, areas > 9):
+        found = prior_variances(values[part], noise[part], areas[part])
+        assert_allclose(found, 1.5**2, rtol=0.15)
 
 
 def test_what_is_measured_well_stays_and_what_is_noise_goes():

@@ -46,7 +46,7 @@ MECHANICS = {
     "bending": ("E voxel^3", "expected energy of bending, E: Young's modulus of the solid"),
     "stretching": ("E voxel^3", "expected energy of stretching"),
     "torsion": ("E voxel^3", "expected energy of torsion"),
-    "bending_share": ("–", "bending / (bending + stretching + torsion)"),
+    "bending_share": ("–", "expected share of bending in the whole energy"),
     "bending_share_std": ("–", "standard deviation of it, by noise and scatter of the nodes"),
     "dominance": ("–", "the kind with over half the energy by one deviation, or undecided"),
     "scatter": ("voxel", "rms distance of the nodes from the motion of a beam"),
@@ -133,14 +133,19 @@ def mechanics(
         for strut in struts
     ]
     known = sound & np.array([fit.converged for fit in fits], dtype=bool)
-    variances = None
-    if known.any():
-        good = [fit for fit, use in zip(fits, known, strict=True) if use]
-        variances = prior_variances(
-            np.array([fit.coefficients for fit in good]), np.array([fit.noise for fit in good])
-        )
+    variances = likely(struts, fits, known) if known.any() else None
     rows = [row(strut, fit, nu, variances) for strut, fit in zip(struts, fits, strict=True)]
     return {name: [values[name] for values in rows] for name in MECHANICS}
+
+
+def likely(struts: list[Strut], fits: list[StrutMotion], known: np.ndarray) -> np.ndarray:
+    """What `prior_variances` tells from the struts that are `known` (n,), one at least."""
+    numbers = np.flatnonzero(known)
+    return prior_variances(
+        np.array([fits[n].coefficients for n in numbers]),
+        np.array([fits[n].noise for n in numbers]),
+        np.array([struts[n].area.mean() for n in numbers]),
+    )
 
 
 def row(strut: Strut, fit: StrutMotion, nu: float, variances: np.ndarray | None) -> dict:
@@ -156,7 +161,7 @@ def row(strut: Strut, fit: StrutMotion, nu: float, variances: np.ndarray | None)
         "rotation": turned(fit),
         **dict(zip(KINDS, map(float, energy.energies), strict=True)),
         "bending_share": float(energy.shares[0]),
-        "bending_share_std": energy.bending_share_std,
+        "bending_share_std": float(energy.share_stds[0]),
         "dominance": dominance(energy),
         "scatter": fit.scatter,
     }
@@ -169,8 +174,8 @@ def turned(fit: StrutMotion) -> float:
 
 def dominance(energy: StrutEnergy) -> str:
     """The kind of KINDS with more than half of the energy, by a standard deviation."""
-    largest = int(np.argmax(energy.energies))
-    share, doubt = energy.shares[largest], energy.share_std(largest)
+    largest = int(np.argmax(energy.shares))
+    share, doubt = energy.shares[largest], energy.share_stds[largest]
     return KINDS[largest] if share - doubt > 0.5 else UNDECIDED
 
 
