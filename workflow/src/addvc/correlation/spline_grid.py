@@ -108,18 +108,22 @@ def evaluate(grid: SplineGrid, coefficients: np.ndarray, points: np.ndarray) -> 
     return sum_basis(coefficients, cell, basis)
 
 
-@nb.njit(parallel=True, cache=True)
+@nb.njit(parallel=True, cache=True, fastmath={"contract"})
 def sum_basis(coefficients, cell, basis):
     """sum_abc N_a N_b N_c p_abc at points given by cell (Q, 3) and basis (Q, 3, 4): (Q, 3)."""
     out = np.zeros((cell.shape[0], 3))
     for p in nb.prange(cell.shape[0]):
+        x, y, z = 0.0, 0.0, 0.0
         for a in range(4):
             for b in range(4):
                 w = basis[p, 0, a] * basis[p, 1, b]
+                line = coefficients[np.uint64(cell[p, 0] + a), np.uint64(cell[p, 1] + b)]
                 for c in range(4):
-                    at = coefficients[cell[p, 0] + a, cell[p, 1] + b, cell[p, 2] + c]
-                    for d in range(3):
-                        out[p, d] += w * basis[p, 2, c] * at[d]
+                    at, share = np.uint64(cell[p, 2] + c), w * basis[p, 2, c]
+                    x += share * line[at, 0]
+                    y += share * line[at, 1]
+                    z += share * line[at, 2]
+        out[p, 0], out[p, 1], out[p, 2] = x, y, z
     return out
 
 

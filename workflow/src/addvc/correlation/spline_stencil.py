@@ -1,8 +1,9 @@
 """Matrices between the control points of a spline grid, and the solution of their systems.
 
 A matrix couples control points at most three apart along each axis, so it is kept as a stencil
-(nx, ny, nz, 7, 7, 7, 6): for each offset the symmetric 3 x 3 block (xx, xy, xz, yy, yz, zz); a
-matrix that treats the components alike as a scalar stencil (nx, ny, nz, 7, 7, 7).
+(nx, ny, nz, 7, 7, 7, 6): for each offset the symmetric 3 x 3 block (xx, xy, xz, yy, yz, zz), in single
+precision since it is the largest array there is and is solved to a few per cent; a matrix that treats
+the components alike as a scalar stencil (nx, ny, nz, 7, 7, 7).
 """
 
 from collections.abc import Callable
@@ -25,7 +26,7 @@ def _pairs(n, out):
             p += 1
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, fastmath={"contract"})
 def _flush_line(line, y, plane):
     for c in range(6):
         for p in range(10):
@@ -34,7 +35,7 @@ def _flush_line(line, y, plane):
     line[:] = 0.0
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, fastmath={"contract"})
 def _flush_plane(plane, x, total):
     for o in range(10):
         for c in range(6):
@@ -44,7 +45,7 @@ def _flush_plane(plane, x, total):
     plane[:] = 0.0
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, fastmath={"contract"})
 def cell_dyads(basis, vectors, weight, total):
     """sum_q w g g^T N_a N_b ... of one cell by pairs: total (10, 6, 10, 10) for x, block, y, z.
 
@@ -77,7 +78,7 @@ def cell_dyads(basis, vectors, weight, total):
 def scatter_dyads(cells, first, basis, vectors, weight):
     """H_ab = sum_q w N_a N_b g g^T over the points, as a stencil (nx, ny, nz, 7, 7, 7, 6)."""
     nx, ny, nz = cells
-    out = np.zeros((nx + 3, ny + 3, nz + 3, 7, 7, 7, 6))
+    out = np.zeros((nx + 3, ny + 3, nz + 3, 7, 7, 7, 6), np.float32)
     pair = np.array([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]])
     for colour in range(4):
         for layer in nb.prange((nx - colour + 3) // 4):
@@ -94,7 +95,7 @@ def scatter_dyads(cells, first, basis, vectors, weight):
     return out
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, fastmath={"contract"})
 def _scatter_cell(total, pair, i, j, k, out):
     for a in range(4):
         for b in range(4):
@@ -108,7 +109,7 @@ def _scatter_cell(total, pair, i, j, k, out):
                                 block[m] += total[pair[a, d], m, pair[b, e], pair[c, f]]
 
 
-@nb.njit(parallel=True, cache=True)
+@nb.njit(parallel=True, cache=True, fastmath={"contract"})
 def stencil_product(stencil, x):
     """A x for a stencil (nx, ny, nz, 7, 7, 7, 6) and x (nx, ny, nz, 3)."""
     nx, ny, nz = x.shape[:3]
@@ -161,15 +162,16 @@ def bending(grid: SplineGrid) -> np.ndarray:
 
 
 def add_scalar(stencil: np.ndarray, scalar: np.ndarray, weight: float) -> None:
-    """stencil += weight * scalar on each component, in place: it is the largest array there is."""
+    """stencil += weight * scalar on each component, in place."""
+    added = (weight * scalar).astype(stencil.dtype)
     for m in DIAGONAL:
-        stencil[..., m] += weight * scalar
+        stencil[..., m] += added
 
 
 def block_jacobi(stencil: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """r -> D^-1 r, both (nx, ny, nz, 3), D being the 3 x 3 blocks of the diagonal."""
     block = stencil[:, :, :, 3, 3, 3][..., [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-    inverse = np.linalg.inv(block)
+    inverse = np.linalg.inv(block.astype(float))
     return lambda r: np.einsum("ijkab,ijkb->ijka", inverse, r)
 
 
