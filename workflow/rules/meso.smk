@@ -48,7 +48,7 @@ rule freeform:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1500, 20.0),
+        mem_mb=memory(1500, 10.0),
         runtime=60,
     params:
         code=code("meso/freeform.py"),
