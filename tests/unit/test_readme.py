@@ -11,9 +11,10 @@ RESULT = {"converged": True, "error": {"rms": 0.0871, "p95": 0.1449}}
 SUMMARY = {
     "meshes": {"meso12": {}, "micro": {}},
     "states": [
-        {"label": "3.4 %", "meso12": RESULT, "micro": RESULT},
+        {"label": "3.4 %", "state": 1, "meso12": RESULT, "micro": RESULT},
         {
             "label": "9 %",
+            "state": 2,
             "meso12": RESULT | {"converged": False},
             "micro": RESULT | {"error": None},
         },
@@ -32,6 +33,14 @@ def test_errors_say_what_did_not_converge_and_what_is_not_known():
         "| `meso12` | 0.087 / 0.145 | 0.087 / 0.145, not converged |",
         "| `micro` | 0.087 / 0.145 | – |",
     ]
+
+
+def test_other_tools_have_rows_of_their_own():
+    peers = [
+        {"tool": "micro, Eq. 10", "state": "1", "rms": "0.106", "p95": "0.175"},
+        {"tool": "elastix 8", "state": "2", "rms": "0.138", "p95": "0.246"},
+    ]
+    assert readme.accuracy(SUMMARY, peers).splitlines()[4:] == ["| elastix 8 | – | 0.138 / 0.246 |"]
 
 
 def test_every_rule_is_in_one_stage():

@@ -1,9 +1,11 @@
 """The figures of README.md, from the summary of the default case.
 
-`python -m addvc.readme README.md results/twin/summary.json` puts each table between its marks,
-`<!-- table NAME -->` and `<!-- end -->`.
+`python -m addvc.readme README.md results/twin/summary.json results/benchmarks/peers_2417.csv` puts each
+table between its marks, `<!-- table NAME -->` and `<!-- end -->`; the last file, of the benchmarks, may
+be left out, and so are the rows of other tools then.
 """
 
+import csv
 import re
 import sys
 from collections.abc import Sequence
@@ -25,6 +27,8 @@ STAGES = {
 }
 REST = "all else but figures"
 
+PEER = "elastix"
+
 
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Rows as markdown, the first one its head."""
@@ -32,14 +36,22 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def accuracy(summary: dict) -> str:
-    """rms and 95th percentile of the error of each result and state, voxels."""
+def accuracy(summary: dict, peers: Sequence[dict] = ()) -> str:
+    """rms and 95th percentile of the error of each result and state, voxels; `peers`: rows of the
+    benchmarks (state, tool, rms, p95), of which other tools than addvc's are taken."""
     states = summary["states"]
     head = ["Error, voxels: rms / 95th percentile", *(state["label"] for state in states)]
     body = [
         [f"`{name}`", *(error_words(state[name]) for state in states)] for name in summary["meshes"]
     ]
-    return table([head, *body])
+    return table([head, *body, *peer_rows(peers, [state["state"] for state in states])])
+
+
+def peer_rows(peers: Sequence[dict], states: Sequence[int]) -> list[list[str]]:
+    """A row for each tool that is not addvc's, a column for each state; "–" where it was not run."""
+    found = {(row["tool"], int(row["state"])): f"{row['rms']} / {row['p95']}" for row in peers}
+    tools = dict.fromkeys(row["tool"] for row in peers if row["tool"].startswith(PEER))
+    return [[tool, *(found.get((tool, state), "–") for state in states)] for tool in tools]
 
 
 def error_words(result: dict) -> str:
@@ -79,10 +91,13 @@ def write_filled(readme: str | Path, tables: dict[str, str]) -> None:
         temporary.write_text(text)
 
 
-def main(readme: str, summary: str) -> None:
+def main(readme: str, summary: str, peers: str | None = None) -> None:
     """Fill README.md."""
-    figures = read_json(summary)
-    write_filled(readme, {"accuracy": accuracy(figures), "cost": cost(figures)})
+    figures, rows = read_json(summary), []
+    if peers is not None:
+        with Path(peers).open(newline="") as file:
+            rows = list(csv.DictReader(file))
+    write_filled(readme, {"accuracy": accuracy(figures, rows), "cost": cost(figures)})
 
 
 if __name__ == "__main__":
