@@ -15,8 +15,8 @@ import h5py
 import numpy as np
 
 from addvc.analysis.struts import Strut
-from addvc.fem.mesh import Mesh, cell_volumes
-from addvc.fem.rotations import nearest_rotation, nodal_mean, smooth_rotations
+from addvc.fem.mesh import Mesh
+from addvc.fem.rotations import nearest_rotation, nodal_average, smooth_rotations
 from addvc.images.files import atomic_path
 
 BINS = 10
@@ -26,8 +26,9 @@ BINS = 10
 def turned(mesh: Mesh, u: np.ndarray, draws: np.ndarray) -> np.ndarray:
     """Draws (d, n, 3) at rest in the frame of a state of displacement u (n, 3), that of
     `corotational`."""
-    rotation = nodal_mean(mesh, smooth_rotations(mesh, u), cell_volumes(mesh))
-    return np.einsum("nij,dnj->dni", nearest_rotation(rotation).astype(draws.dtype), draws)
+    flat = nodal_average(mesh) @ smooth_rotations(mesh, u).reshape(-1, 9)
+    rotation = nearest_rotation(flat.reshape(-1, 3, 3)).astype(draws.dtype)
+    return np.einsum("nij,dnj->dni", rotation, draws)
 
 
 def standard_uncertainty(draws: np.ndarray) -> np.ndarray:

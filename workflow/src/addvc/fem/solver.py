@@ -57,18 +57,23 @@ class Factor:
 
 @nb.njit(cache=True)
 def triangular_solves(data, indices, indptr, b):
-    """L L^T x = b for L in csc, the diagonal first in each column."""
+    """L L^T x = b for L in csc, the diagonal first in each column.
+
+    Indices are unsigned: a signed one is looked at for being negative, a third of the time."""
     x = b.copy()
-    n = len(x)
+    n, one = len(x), np.uint64(1)
     for j in range(n):
-        x[j] /= data[indptr[j]]
-        for p in range(indptr[j] + 1, indptr[j + 1]):
-            x[indices[p]] -= data[p] * x[j]
+        start, stop = np.uint64(indptr[j]), np.uint64(indptr[j + 1])
+        value = x[j] / data[start]
+        x[j] = value
+        for p in range(start + one, stop):
+            x[np.uint64(indices[p])] -= data[p] * value
     for j in range(n - 1, -1, -1):
+        start, stop = np.uint64(indptr[j]), np.uint64(indptr[j + 1])
         total = x[j]
-        for p in range(indptr[j] + 1, indptr[j + 1]):
-            total -= data[p] * x[indices[p]]
-        x[j] = total / data[indptr[j]]
+        for p in range(start + one, stop):
+            total -= data[p] * x[np.uint64(indices[p])]
+        x[j] = total / data[start]
     return x
 
 
