@@ -270,7 +270,26 @@ def test_the_page_of_keys_is_up_to_date():
 
 def test_the_porosity_of_real_scans_must_be_given():
     with pytest.raises(ConfigError, match="`porosity` is missing: give"):
-        settings.check_given({"scans": {"reference": "a", "states": ["b"]}})
+        settings.check_given({"case": "mine", "scans": {"reference": "a", "states": ["b"]}})
+
+
+def test_scans_have_a_case_of_their_own():
+    with pytest.raises(ConfigError, match=r"`case` is twin, .*case: mine"):
+        settings.check_given({"scans": {"reference": "a", "states": ["b"]}, "porosity": 0.9})
+
+
+def test_a_slab_that_ends_before_it_begins_is_refused():
+    settings.check_region("all")
+    settings.check_region({"low": 40})
+    with pytest.raises(ConfigError, match=r"low = 80 to high = 40; low must be below"):
+        settings.check_region({"low": 80, "high": 40})
+
+
+@pytest.mark.parametrize("size", [0.018, 18e-6])
+def test_a_voxel_in_millimetres_or_metres_is_refused(size):
+    schema = yaml.safe_load(reference.SCHEMA.read_text())
+    with pytest.raises(ConfigError, match=r"voxel_size_um`: .* less than .* 18, not 0.018"):
+        settings.check_values({"scans": {"reference": "a", "voxel_size_um": size}}, schema)
 
 
 def test_a_truth_belongs_to_real_scans(tmp_path):
@@ -288,9 +307,10 @@ def test_a_truth_belongs_to_real_scans(tmp_path):
 
 
 def test_scans_without_states_are_warned_of():
-    (warning,) = settings.check_given({"scans": {"reference": "a"}, "porosity": 0.9})
+    (warning,) = settings.check_given({"case": "a", "scans": {"reference": "a"}, "porosity": 0.9})
     assert "scans.states is empty" in warning
-    assert not settings.check_given({"scans": {"reference": "a", "states": ["b"]}, "porosity": 0.9})
+    scans = {"reference": "a", "states": ["b"]}
+    assert not settings.check_given({"case": "a", "scans": scans, "porosity": 0.9})
 
 
 def test_a_value_out_of_bounds_is_told_in_one_line():

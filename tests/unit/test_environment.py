@@ -232,6 +232,13 @@ def test_missing_config_file_is_named(ready, tmp_path):
     assert "none.yaml: no such configuration" in result.stderr
 
 
+def test_a_configuration_in_the_place_of_a_target_is_told(ready, tmp_path):
+    (tmp_path / "my.yaml").touch()
+    result, calls = ready("run", "my.yaml", cwd=tmp_path)
+    assert result.returncode == 1 and not calls
+    assert "./addvc run --configfile my.yaml" in result.stderr
+
+
 def test_number_of_blas_threads_can_be_set(ready):
     _, calls = ready("test", OPENBLAS_NUM_THREADS="4")
     assert calls[1].startswith("threads 4")

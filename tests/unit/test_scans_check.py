@@ -83,7 +83,19 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path, pages):
             sum(line.startswith((f"scan {path} ", f"{path}: ", f"{path} ")) for line in lines) == 1
         )
     assert "was not found (0 files; at least 1)" in lines[0]
-    check_headers(config(good, good))
+    assert check_headers(config(good)).startswith("1 scans of 34 x 37 x 41 voxels")
+
+
+def test_a_scan_that_is_listed_twice_is_refused(tmp_path, pages):
+    for name in ("a.npy", "b.npy"):
+        np.save(tmp_path / name, pages)
+    a, b, link = (tmp_path / name for name in ("a.npy", "b.npy", "link.npy"))
+    link.symlink_to(a)
+    check_headers(config(a, b))
+    with pytest.raises(ScanError, match=r"scans.states\[1\] is the same scan as scans.reference"):
+        check_headers(config(a, b, link))
+    with pytest.raises(ScanError, match=r"scans.states\[1\] is the same scan as scans.states\[0\]"):
+        check_headers(config(a, b, b))
 
 
 def test_a_problem_that_all_share_is_told_once(tmp_path, pages):

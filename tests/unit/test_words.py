@@ -9,8 +9,17 @@ import pytest
 from snakemake.utils import validate
 
 from addvc.errors import AddvcError
+from addvc.report.doubts import strain_warnings
 from addvc.report.page_tables import results_table
-from addvc.report.words import check_verdicts, closing_lines, front_page, micro_name, warnings
+from addvc.report.words import (
+    check_verdicts,
+    closing_lines,
+    front_page,
+    micro_name,
+    noise_words,
+    state_words,
+    warnings,
+)
 
 CONFIG = {
     "case": "foam-2_b",
@@ -123,13 +132,13 @@ def test_sigma_of_noise_alone_stands_beside_that_of_the_residual():
 @pytest.mark.parametrize(
     ("one", "words"),
     [
-        (GOOD, "state 1 (1.1% measured): converged; sigma(r) 0.56, 4 iterations, 100.0% of nodes "
-               "valid, error median 0.033, p95 0.084 voxel"),
-        (DOUBTFUL, "state 2 (2.2% measured): measured, with doubtful places; "),
-        (ENDLESS, "state 3 (3.3% measured): measured, with doubtful places; sigma(r) 0.56, 40 iter"),
-        (LOST, "state 4 (4.4% measured): FAILED: not to be used; sigma(r) 0.56, 40 iterations, "
-               "20.0% of nodes valid"),
-        (UNKNOWN, "state 5 (5.5% measured): FAILED: not to be used; sigma(r) unknown, 40 iter"),
+        (GOOD, "1 (1.4 %; 1.1% compression measured): converged; sigma(r) 0.56, 4 iterations, 100.0% "
+               "of nodes valid, error median 0.033, p95 0.084 voxel"),
+        (DOUBTFUL, "2 (2.4 %; 2.2% compression measured): measured, with doubtful places; "),
+        (ENDLESS, "3 (3.4 %; 3.3% compression measured): measured, with doubtful places; sigma(r) 0.56"),
+        (LOST, "4 (4.4 %; 4.4% compression measured): FAILED: not to be used; sigma(r) 0.56, 40 "
+               "iterations, 20.0% of nodes valid"),
+        (UNKNOWN, "5 (5.4 %; 5.5% compression measured): FAILED: not to be used; sigma(r) unknown, 40"),
     ],
 )  # fmt: skip
 def test_closing_lines_tell_the_verdict_of_each_state(one, words):
@@ -181,9 +190,33 @@ def test_the_front_page_answers_first():
     head = front_page(summary(*ALL), CONFIG, SCANS).split("Warnings and failures")[0]
     assert "5 loading states" in head
     assert "28.0 voxels (560 micrometres)" in head
-    assert "State 1 (1.4 %; 1.1% measured): **converged**" in head
-    assert "State 2 (2.4 %; 2.2% measured): **measured, with doubtful places**, 80.0% of" in head
-    assert "State 4 (4.4 %; 4.4% measured): **FAILED: not to be used**, 20.0% of" in head
+    assert "State 1 (1.4 %; 1.1% compression measured): **converged**" in head
+    assert (
+        "State 2 (2.4 %; 2.2% compression measured): **measured, with doubtful places**, 80.0% of"
+        in head
+    )
+    assert (
+        "State 4 (4.4 %; 4.4% compression measured): **FAILED: not to be used**, 20.0% of" in head
+    )
+
+
+def test_an_extension_or_a_falling_strain_is_warned_of():
+    """A wrong axis, the states in another order, the reference among them: all have a sign."""
+    states = [dict(one, state=n, strain=strain) for n, (one, strain) in
+              enumerate(zip((GOOD, GOOD, GOOD), (0.28, 0.03, 0.05), strict=True), start=1)]  # fmt: skip
+    told = " ".join(strain_warnings({"states": states}))
+    assert "falls from 28.0% to 3.0% in state 2" in told and "order of loading" in told
+    states[1]["strain"], states[0]["strain"] = -0.4, -0.4
+    told = " ".join(strain_warnings({"states": states}))
+    assert "longer, by 40.0% in state 1" in told and "loading_axis" in told
+    assert not strain_warnings({"states": [dict(GOOD, state=1, strain=0.0)]})
+    assert state_words(states[1] | {"label": "state 2"}) == "2 (40.0% extension measured)"
+
+
+def test_a_state_says_how_well_its_nodes_are_known():
+    found = noise_words({"uncertainty": {"rms": 0.0641}}, 20.0)
+    assert "0.064 voxel (1.3 micrometres)" in found
+    assert noise_words({"uncertainty": {}}, 20.0) == ""
 
 
 def test_the_front_page_tells_of_a_band():

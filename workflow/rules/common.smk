@@ -33,7 +33,7 @@ def checked_config(config):
         if "scans" in config and workflow.is_main_process:
             from addvc.images.scans_check import check_headers  # slow to load
 
-            check_headers(config)
+            print(f"addvc: {check_headers(config)}", file=sys.stderr)
         return [settings.scan_files(path) for path in settings.scan_paths(config)]
     except AddvcError as error:
         raise WorkflowError(

@@ -14,6 +14,7 @@ from addvc.errors import ConfigError
 AXES = {"x": 0, "y": 1, "z": 2}
 NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
 NOMINAL_CELL = 28.0
+DEMO = "twin"  # the case that the default configuration has
 TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
 IMAGING = (  # keys of `twin` that change its scans, but neither foam nor motion
     "bin",
@@ -77,6 +78,12 @@ def check_given(config: dict) -> list[str]:
     """Warnings about real scans; ConfigError when they come without their porosity."""
     if "scans" not in config:
         return []
+    if config.get("case", DEMO) == DEMO:
+        raise ConfigError(
+            f"`case` is {DEMO}, whose folder is the demonstration's: give your scans a case of their "
+            "own, such as `case: mine` (results go to results/mine)"
+        )
+    check_region(config.get("micro", {}).get("region", "all"))
     platens = config["scans"].get("platens", "auto")
     if platens == "none" and "extrapolated" in config.get("meso", {}).get("candidates", []):
         raise ConfigError(
@@ -94,6 +101,16 @@ def check_given(config: dict) -> list[str]:
             "or give `virtual` to have the reference deformed by a known field"
         ]
     return []
+
+
+def check_region(region: str | dict) -> None:
+    """ConfigError where a slab of `micro.region` ends before it begins."""
+    wanted = {} if region == "all" else region
+    low, high = wanted.get("low"), wanted.get("high")
+    if low is not None and high is not None and low >= high:
+        raise ConfigError(
+            f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
+        )
 
 
 def truth_file(config: dict) -> str | None:

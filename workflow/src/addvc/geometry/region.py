@@ -33,9 +33,11 @@ def micro_region(specimen: Specimen, setting, margin: float = 3.0) -> Region:
     low = max(wanted.get("low", -np.inf), specimen.low + margin)
     high = min(wanted.get("high", np.inf), specimen.high - margin)
     if high - low < 4:
+        given = ", ".join(f"{key} = {value:g}" for key, value in wanted.items())
         raise GeometryError(
-            f"micro.region keeps {high - low:.1f} voxels along the loading axis (from {low:.1f} to "
-            f"{high:.1f}; the specimen spans {specimen.low:.1f} to {specimen.high:.1f}); at least 4"
+            f"micro.region ({given or 'all'}) leaves {max(high - low, 0):.1f} voxels along the loading "
+            f"axis (at least 4) of {specimen.low + margin:.1f} to {specimen.high - margin:.1f}, where "
+            "the specimen is (voxels of the binned image); give a slab within that"
         )
     if specimen.kind == "box":
         width = wanted.get("radius", np.inf)

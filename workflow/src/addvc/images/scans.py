@@ -228,7 +228,7 @@ class _Seen:
         if self.bad:
             raise ScanError(
                 f"{self.scan.path}: {self.bad} voxels are NaN or infinite, the first at (x, y, z) "
-                f"= {self.first_bad} of the scan; crop them away or replace them"
+                f"= {self.first_bad} of the scan; crop them away (scans.crop), or replace them"
             )
         if self.low == self.high:
             raise ScanError(

@@ -164,7 +164,7 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
         if not trials:
             continue
         tried, risk = np.array(sorted((row["l_e"], row["risk"]) for row in trials)).T
-        risk = (risk - risk.min()) / risk.min()
+        risk = (risk - risk.min()) / (risk.min() or 1.0)
         ax.plot(tried, 100 * risk, "o-", color=colour, ms=4, label=case.title(state, case.micro[0]))
         ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
     ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um())})")

@@ -3,12 +3,14 @@
 from addvc.analysis.balance import refusal
 from addvc.report.page_tables import figure, micro_name
 
+STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
 
 
 def warnings(summary: dict) -> list[str]:
     """What to distrust; "None." when there is nothing, so that the section is never silently empty."""
-    found = [line for state in summary["states"] for line in state_warnings(state, summary)]
+    found = strain_warnings(summary)
+    found += [line for state in summary["states"] for line in state_warnings(state, summary)]
     micro = summary["meshes"][micro_name(summary)]
     kept = micro["kept_fraction"] * micro["voxel_kept_fraction"]
     if kept < 0.9:
@@ -28,6 +30,28 @@ def warnings(summary: dict) -> list[str]:
         for check in failed_checks(summary)
     ]
     return found or ["None."]
+
+
+def strain_warnings(summary: dict) -> list[str]:
+    """Lines where the specimen gets longer, or the strain falls from state to state: is it the axis, or
+    the order of the scans, that is wrong?"""
+    strains = {state["state"]: state["strain"] for state in summary["states"]}
+    longer = [number for number, strain in strains.items() if strain < -STRETCHED]
+    falls = [n for n in strains if strains[n] < strains.get(n - 1, strains[n]) - STRETCHED]
+    found = []
+    for n in longer[:1]:
+        found.append(
+            f"- The specimen gets longer, by {-strains[n]:.1%} in state {n} (at most {STRETCHED:.1%} in "
+            "a compression): unless it was pulled, loading_axis is another, or scans.reference is not "
+            "the scan at rest."
+        )
+    for n in falls[:1]:
+        found.append(
+            f"- The strain falls from {strains[n - 1]:.1%} to {strains[n]:.1%} in state {n} (by at most "
+            f"{STRETCHED:.1%} under a growing load): unless the specimen was unloaded, scans.states is "
+            "not in the order of loading."
+        )
+    return found
 
 
 def topology_warnings(counts: dict | None) -> list[str]:

@@ -31,7 +31,7 @@ def closing_lines(summary: dict, folder: str) -> str:
     for state in summary["states"]:
         found = state[micro]
         lines.append(
-            f"  state {state['state']} ({state['strain']:.1%} measured): "
+            f"  state {state_words(state)}: "
             f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}"
             f"{alone_words(state)}, "
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
@@ -102,12 +102,27 @@ def answer(summary: dict) -> list[str]:
     for state in summary["states"]:
         found = state[micro_name(summary)]
         lines.append(
-            f"- State {state['state']} ({state['label']}; {state['strain']:.1%} measured): "
+            f"- State {state_words(state)}: "
             f"**{VERDICTS[state['verdict']]}**, {found['valid_nodes']:.1%} of the nodes "
-            f"valid{error_words(found['error'])}.{strut_words(state.get('struts'))}"
-            + band_words(state.get("cells"))
+            f"valid{noise_words(state, size)}{error_words(found['error'])}."
+            f"{strut_words(state.get('struts'))}" + band_words(state.get("cells"))
         )
     return [*lines, "", cost_words(summary["cost"])]
+
+
+def state_words(state: dict) -> str:
+    """Number of a state, its nominal strain where there is one, and the measured one."""
+    sense = "compression" if state["strain"] >= 0 else "extension"
+    named = "" if state["label"] == f"state {state['state']}" else f"{state['label']}; "
+    return f"{state['state']} ({named}{abs(state['strain']):.1%} {sense} measured)"
+
+
+def noise_words(state: dict, voxel_um: float) -> str:
+    """By how much the noise of the images moves a node: the standard uncertainty, rms over the nodes."""
+    rms = (state.get("uncertainty") or {}).get("rms")
+    if rms is None:
+        return ""
+    return f", known to {rms:.3f} voxel ({rms * voxel_um:.2g} micrometres) as far as noise goes"
 
 
 def cost_words(cost: dict) -> str:
