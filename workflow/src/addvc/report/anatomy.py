@@ -39,6 +39,7 @@ def states(case: Case, outputs: Iterable[str]) -> None:
         render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state] if state else "reference", panel)
     style.scale_bar(axes[0, 0], case.voxel_um(), 0.5)
+    style.axis_arrows(axes[0, -1], view.right, view.up)
     style.save(fig, outputs)
 
 

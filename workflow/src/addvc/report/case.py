@@ -129,9 +129,13 @@ class Case:
         with h5py.File(self.path(f"dvc/{mesh}_state{state}.h5")) as file:
             return bool(file.attrs["converged"])
 
+    def valid(self, mesh: str, state: int) -> np.ndarray:
+        """(n,): 1 for a node of a micro result whose residual is no more than noise explains, or 0."""
+        return read_vtu(self.path(f"fields/{mesh}_state{state}.vtu"))[2]["valid"]
+
     def valid_share(self, mesh: str, state: int) -> float:
-        """Share of the nodes whose residual is no more than noise explains."""
-        return float(read_vtu(self.path(f"fields/{mesh}_state{state}.vtu"))[2]["valid"].mean())
+        """Share of such nodes."""
+        return float(self.valid(mesh, state).mean())
 
     def status(self, mesh: str, state: int) -> str:
         """Nothing for a good result; `failed` when most of the struts are off; `not converged`."""

@@ -1,8 +1,10 @@
 """Fig. 13 and 15: residual, displacement and strain on the struts, meso beside micro."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.patches import Patch
 
 from addvc.fem.operators import strain
 from addvc.report import style
@@ -31,6 +33,7 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     for ax, name in zip(axes[:, 0], names, strict=True):
         style.row_name(ax, name)
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
+    style.axis_arrows(axes[-1, -1], view.right, view.up)
     label = "residual r (grey levels)"
     style.colour_bar(fig, axes, norm, style.SIGNED, label, shrink=0.7, aspect=30)
     style.save(fig, outputs)
@@ -57,29 +60,50 @@ def fields(case: Case, outputs: Iterable[str]) -> None:
     labels = [f"$u_{x}$ ({style.voxels(case.voxel_um())})" for x in style.AXES]
     labels.append(r"strain $\|\varepsilon\|_F$ (–)")
     view = facing(case.specimen.axis, slab(case.mesh("micro"), case.specimen.axis, 1)[0])
-    fig, axes = style.panels(4, 2, aspect(view, slices[0][0]), 11, 18, below=6)
+    fig, axes = style.panels(4, 2, aspect(view, slices[0].points), 11, 18, below=8)
     for d, label in enumerate(labels):
-        pair = [fields[d] for _, _, fields in slices]
+        pair = [part.values[d] for part in slices]
         norm, cmap = _strain_range(pair) if d == 3 else style.component_range(pair)
-        for column, name in enumerate(names):
-            points, faces, _ = slices[column]
-            layer = Layer(points, faces, values=pair[column], norm=norm, cmap=cmap)
-            render([layer], view, 75).show(axes[d, column])
+        for column, (name, part) in enumerate(zip(names, slices, strict=True)):
+            render(part.layers(d, norm, cmap), view, 75).show(axes[d, column])
             text = f"{name}, {case.title(state, name)}"
             style.headline(axes[d, column], text, 2 * d + column)
         style.colour_bar(fig, axes[d], norm, cmap, label, aspect=16, shrink=0.9, pad=0.02)
     style.scale_bar(axes[-1, 0], case.voxel_um())
+    style.axis_arrows(axes[-1, 1], view.right, view.up)
+    if any(part.doubtful.any() for part in slices):
+        doubt = [Patch(color=style.DOUBT, label="in doubt: residual far above the noise")]
+        fig.legend(handles=doubt, loc="outside lower center")
     style.save(fig, outputs)
 
 
-def _slice(case: Case, name: str, state: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Points, triangles, and u_x, u_y, u_z of the points with the strain norm of the triangles, in
-    the slice of Fig. 14."""
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """Triangles (f, 3) between points (p, 3); u_x, u_y, u_z (p,) and the strain norm (f,) as `values`;
+    `doubtful` (f,) where a corner of them is not valid."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    values: list[np.ndarray]
+    doubtful: np.ndarray
+
+    def layers(self, number: int, norm: style.Normalize, cmap: str) -> list[Layer]:
+        """Triangles in the colours of one of the values, doubtful ones in theirs."""
+        values, right = self.values[number], ~self.doubtful
+        values = values[right] if len(values) == len(right) else values
+        found = [Layer(self.points, self.faces[right], values=values, norm=norm, cmap=cmap)]
+        return [*found, Layer(self.points, self.faces[self.doubtful], style.DOUBT)]
+
+
+def _slice(case: Case, name: str, state: int) -> Slice:
+    """The slice of Fig. 14."""
     mesh, u = case.mesh("micro"), case.displacement(name, state)
     low, high = slab_box(mesh, case.specimen.axis, case.cell_size)
     norm = np.linalg.norm(strain(mesh, u), axis=(1, 2))
-    points, faces, found = clipped(mesh, low, high, u=u, strain=norm)
-    return points, faces, [*found["u"].T, found["strain"]]
+    valid = case.valid(name, state) if name in case.micro else np.ones(len(u))
+    points, faces, found = clipped(mesh, low, high, u=u, strain=norm, valid=valid.astype(float))
+    doubtful = (found["valid"][faces] < 0.5).any(axis=1)
+    return Slice(points, faces, [*found["u"].T, found["strain"]], doubtful)
 
 
 def _strain_range(pair: list[np.ndarray]) -> tuple[style.Normalize, str]:

@@ -31,6 +31,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             style.note(ax, sigma + _inverted(mesh, solution.u), fontsize=8)
         style.row_name(axes[row, 0], name)
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.2)
+    style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.2)
     style.save(fig, outputs)
 
 
@@ -69,6 +70,7 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
         label = f"$u_{style.AXES[d]}$ ({style.voxels(case.voxel_um())})"
         style.colour_bar(fig, axes[d], norm, cmap, label, shrink=0.85, aspect=18, pad=0.01)
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.17)
+    style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.17)
     style.save(fig, outputs)
 
 

@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, FuncNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 
 from addvc.images.files import atomic_path
 
@@ -24,9 +25,13 @@ WIDTH, HEIGHT = 170.0, 232.0  # mm, the text of a page
 DPI = 300
 MAGNITUDE, SIGNED = "viridis", "RdBu_r"
 SOLID, BLUE, RED, ORANGE, DARK = "#c6ccd3", "#3d86cf", "#c8341f", "#e08214", "#303438"
+DOUBT = "#d10f9b"  # what is not to be trusted, in maps of any colours
 SERIES = ("#440154", "#31688e", "#35b779", "#e6a000", "#c51b7d", "#7f7f7f")
 MARKERS = "osD^vP"
 AXES = "xyz"
+
+ARROW = 14.0  # length of the arrows along the axes, points
+ARROWHEAD = {"arrowstyle": "<|-", "lw": 1, "color": "k", "shrinkA": 0, "shrinkB": 0}
 LONG, NARROW = 28, 14  # characters: of a title that takes two lines, of a line below a tick
 
 plt.rcParams.update(
@@ -184,6 +189,21 @@ def note(ax: Axes, text: str, x: float = 0.5, y: float = 0.0, **options) -> None
 def row_name(ax: Axes, name: str) -> None:
     """The name of a row, upright at the left of its first panel."""
     note(ax, name, -0.03, 0.5, rotation=90, ha="right", va="center", fontsize=9)
+
+
+def axis_arrows(ax: Axes, right: np.ndarray, up: np.ndarray, y: float = -0.025) -> None:
+    """Arrows along x, y and z as they point in a picture with the directions `right` (3,) and `up` (3,),
+    below its right end at `y` over its height; none for an axis that points at the viewer."""
+    below = ax.transAxes + ScaledTranslation(0, -1.2 * ARROW / 72, ax.figure.dpi_scale_trans)
+    for name, *along in zip(AXES, right, up, strict=True):
+        if np.hypot(*along) < 0.2:
+            continue
+        for text, length, arrow in (("", ARROW, ARROWHEAD), (name, 1.5 * ARROW, None)):
+            tip = length * np.array(along)
+            ax.annotate(
+                text, (0.9, y), tip, below, "offset points", arrow,
+                annotation_clip=False, ha="center", va="center", fontsize=8,
+            )  # fmt: skip
 
 
 def scale_bar(ax: Axes, voxel_um: float, share: float = 0.3, y: float = -0.025) -> None:
