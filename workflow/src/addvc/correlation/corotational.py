@@ -43,7 +43,10 @@ EARLY_MOST = 10
 FAR = 2
 """Rungs of the ladder of l_E that one linear step is trusted for."""
 
-ROUNDS = 3
+HELPED = 0.99
+"""Share of the nodes in doubt, over that before, that a cycle of mending leaves where it was of use."""
+
+ROUNDS = 2
 """Stages at most to choose l_E in."""
 
 
@@ -154,21 +157,22 @@ def with_cutoff(
     ladder: Ladder,
     mending: Mending | None = None,
 ) -> tuple[Problem, np.ndarray, list[tuple[Solution, dict]], list[dict]]:
-    """The problem with the l_E of least risk, u by the one before, the stages that it took (like the
-    `last`, but ended early), the trials.
+    """The problem with the l_E of least risk, u (n, 3), the stages that it took (like the `last`, but
+    ended early), the trials.
 
-    One linear step tells the risk only so far: from far off the stage is run again with the new l_E. A
-    stage that is not finite leaves l_E as it is. What is in doubt does not count where it is mended: a
-    few lost struts ask for an l_E that lets them lie anywhere (two twins at 28.5 %, with them / without:
-    10 / 15 voxels, .51 / .44 and .44 / .18 voxel rms)."""
+    One linear step from u tells the risk only so far: from far off a stage is run with the new l_E, and
+    the choice made again. A stage that is not finite leaves l_E as it is. What is in doubt does not
+    count where it is mended: a few lost struts ask for an l_E that lets them lie anywhere (two twins at
+    28.5 %, with them / without: 10 / 15 voxels)."""
     done, rung, trials = [], 0, []
     stage = replace(last, stop=early(last.stop))
     while True:
         system = stage_system(problem, stage, u)
-        done.append(run(problem, stage, deformed, u, "l_E", system))
-        if not np.isfinite(done[-1][0].history[-1]):
-            return problem, u, done, trials
-        u = done[-1][0].u
+        if rung != 0:
+            done.append(run(problem, stage, deformed, u, "l_E", system))
+            if not np.isfinite(done[-1][0].history[-1]):
+                return problem, u, done, trials
+            u = done[-1][0].u
         if mending is not None:
             system = replace(system, reference=trusted(system.reference, deformed, u, mending))
         best, trials = least_risk(trial_of(system, deformed, u, ladder), ladder, rung)
@@ -221,13 +225,16 @@ def trusted(
 def mended(
     problem: Problem, deformed: np.ndarray, u: np.ndarray, last: Stage, mending: Mending
 ) -> Iterator[tuple[Solution, dict]]:
-    """The stages of the cycles of mending: twice carried, then with all points, wide and narrow."""
+    """The stages of the cycles of mending: twice carried, then with all points, wide and narrow. A cycle
+    that leaves as much in doubt as the one before is the last: contacts are in doubt, and right."""
+    most = mending.most
     short = replace(last, stop=early(last.stop))
     wide = replace(short, scale=None if last.scale is None else 2 * last.scale)
     for _ in range(mending.cycles):
         doubtful = doubtful_nodes(problem.reference, deformed, u, mending.limit)
-        if not mending.least <= doubtful.mean() < mending.most:
+        if not mending.least <= doubtful.mean() < most:
             return
+        most = HELPED * doubtful.mean()
         log.info("micro DVC: %.2f %% of the nodes are let go", 100 * doubtful.mean())
         carried = replace(problem, reference=without(problem.reference, doubtful))
         plan = [(carried, short, "carried")] * 2 + [
