@@ -99,13 +99,6 @@ def _slopes(t, degree):
 
 
 @nb.njit(inline="always")
-def _single(w):
-    """The six of them in single precision, which the voxels have."""
-    f = np.float32
-    return f(w[0]), f(w[1]), f(w[2]), f(w[3]), f(w[4]), f(w[5])
-
-
-@nb.njit(inline="always")
 def _clamp(i, n):
     """Unsigned, since a signed index is looked at for being negative: half of the time of a sum."""
     return np.uint64(min(max(i, 0), n - 1))
@@ -153,11 +146,11 @@ def spline_value(coefficients, points, degree=DEGREE):
             continue
         inside[p] = True
         i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
-        wx, wy = _single(_weights(x - i, degree)), _single(_weights(y - j, degree))
-        wz, at = _single(_weights(z - k, degree)), _places(k, nz)
-        total = np.float32(0)
+        wx, wy = _weights(x - i, degree), _weights(y - j, degree)
+        wz, at = _weights(z - k, degree), _places(k, nz)
+        total = 0.0
         for a in range(6):
-            along_y, at_x = np.float32(0), _clamp(i - 2 + a, nx)
+            along_y, at_x = 0.0, _clamp(i - 2 + a, nx)
             for b in range(6):
                 along_y += wy[b] * _sum(coefficients, at_x, _clamp(j - 2 + b, ny), at, wz)
             total += wx[a] * along_y
@@ -183,13 +176,13 @@ def spline_value_gradient(coefficients, points, degree=DEGREE):
             continue
         inside[p] = True
         i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
-        wx, wy = _single(_weights(x - i, degree)), _single(_weights(y - j, degree))
-        wz, at = _single(_weights(z - k, degree)), _places(k, nz)
-        sx, sy = _single(_slopes(x - i, degree)), _single(_slopes(y - j, degree))
-        sz, zero = _single(_slopes(z - k, degree)), np.float32(0)
-        total, slope_x, slope_y, slope_z = zero, zero, zero, zero
+        wx, wy = _weights(x - i, degree), _weights(y - j, degree)
+        wz, at = _weights(z - k, degree), _places(k, nz)
+        sx, sy = _slopes(x - i, degree), _slopes(y - j, degree)
+        sz = _slopes(z - k, degree)
+        total, slope_x, slope_y, slope_z = 0.0, 0.0, 0.0, 0.0
         for a in range(6):
-            along_y, turned_y, turned_z = zero, zero, zero
+            along_y, turned_y, turned_z = 0.0, 0.0, 0.0
             at_x = _clamp(i - 2 + a, nx)
             for b in range(6):
                 at_y = _clamp(j - 2 + b, ny)
