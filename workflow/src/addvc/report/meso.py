@@ -31,7 +31,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             style.note(ax, sigma + _inverted(mesh, solution.u), fontsize=8)
         style.row_name(axes[row, 0], name)
     style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.2)
-    style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.2)
+    style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.28)
     style.save(fig, outputs)
 
 
