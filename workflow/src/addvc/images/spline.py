@@ -100,7 +100,7 @@ def _slopes(t, degree):
 
 @nb.njit(inline="always")
 def _clamp(i, n):
-    """Unsigned, since a signed index is looked at for being negative: half of the time of a sum."""
+    """Unsigned, since a signed index is looked at for being negative: half of a gradient's time."""
     return np.uint64(min(max(i, 0), n - 1))
 
 
