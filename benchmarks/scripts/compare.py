@@ -5,8 +5,8 @@ from pathlib import Path
 from benchmark.study import rows_of_study
 from benchmark.tables import best_of, with_ratio, write_csv
 
-from addvc.images.files import read_json
 from addvc.runtime import job
+from addvc.images.files import read_json
 
 with job(snakemake):
     given, params = snakemake.input, snakemake.params

@@ -5,10 +5,10 @@ from pathlib import Path
 from benchmark.elastix import ElastixOptions, displacement, elastix, near_solid
 from benchmark.study import bulk_nodes, truth_of
 
+from addvc.runtime import job
 from addvc.analysis.truth import errors_at
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_volume
-from addvc.runtime import job
 
 with job(snakemake) as log:
     config = read_json(snakemake.input[0])

@@ -8,8 +8,8 @@ import yaml
 from benchmark.study import targets
 from snakemake.utils import validate
 
-from addvc.images.files import write_json
 from addvc.runtime import job
+from addvc.images.files import write_json
 
 with job(snakemake):
     given = snakemake.input.config

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from benchmark.study import bulk_nodes, micro_with, truth_of
 
+from addvc.runtime import job
 from addvc.analysis.truth import errors_at
 from addvc.images.files import read_json, write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     config, changes = read_json(snakemake.input[0]), snakemake.params.changes

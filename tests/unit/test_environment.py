@@ -216,14 +216,17 @@ def test_another_logger_may_be_asked_for(ready):
 
 def test_config_file_is_found_from_the_callers_folder(ready, tmp_path):
     (tmp_path / "my.yaml").touch()
+    where = f"threads 1 in {ready.folder}"
     for words in (["--configfile", "my.yaml"], ["--configfile=my.yaml"]):
         _, calls = ready("run", *words, "-n", "my.yaml.html", cwd=tmp_path)
-        assert calls[0].endswith(f"--configfile {tmp_path}/my.yaml -n my.yaml.html")
-        assert calls[1] == f"threads 1 in {ready.folder}"
+        run, checked = [call for call in calls if call != where][::-1]
+        assert checked == f"python -m addvc.readable {tmp_path}/my.yaml"
+        assert run.endswith(f"--configfile {tmp_path}/my.yaml -n my.yaml.html")
+        assert calls.count(where) == len(calls) - 2 > 0
     (ready.folder / "config").mkdir(exist_ok=True)
     (ready.folder / "config/paper.yaml").touch()
     _, calls = ready("run", "--configfile", "config/paper.yaml", cwd=tmp_path)
-    assert calls[0].endswith("--configfile config/paper.yaml")
+    assert [call for call in calls if call != where][-1].endswith("--configfile config/paper.yaml")
 
 
 def test_missing_config_file_is_named(ready, tmp_path):

@@ -7,7 +7,8 @@ import pytest
 import yaml
 from snakemake.utils import validate
 
-from addvc.images.hashes import content_hash
+from addvc.errors import ScanError
+from addvc.images.hashes import check_different, content_hash
 from addvc.provenance import commit
 from addvc.report.methods import STARTS, listing, methods, span
 from addvc.report.references import REFERENCES, Citations
@@ -139,3 +140,11 @@ def test_every_start_of_the_schema_has_its_words():
     text = told(config() | {"meso": config()["meso"] | {"candidates": names}})
     assert "the motion of the platens" in text
     assert set(names) == set(STARTS)
+
+
+def test_a_copy_of_a_scan_under_another_name_is_refused():
+    check_different({"rest.tif": "ab" * 32, "load.tif": "cd" * 32})
+    with pytest.raises(
+        ScanError, match=r"again.tif and rest.tif hold the same bytes \(SHA-256 abab"
+    ):
+        check_different({"rest.tif": "ab" * 32, "load.tif": "cd" * 32, "again.tif": "ab" * 32})

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from addvc.runtime import job
+from addvc.readable import fault
 from snakemake_logger_plugin_addvc import clock, job_words
 
 SOURCE = Path(__file__).parents[2] / "workflow/src"
@@ -78,10 +79,47 @@ def test_what_is_wrong_before_any_job_is_told(snakemake, tmp_path):
     assert status == 1 and "the remedy" in said
 
 
-def test_a_dry_run_is_snakemakes_own(snakemake):
+def test_a_job_that_has_told_its_error_is_named_in_a_line(snakemake, tmp_path):
+    text = SNAKEFILE.replace("echo the", "echo ERROR: the")
+    (tmp_path / "Snakefile").write_text(text)
+    status, said = snakemake("--keep-going", "--show-failed-logs")
+    assert status == 1 and "FAILED: bad" in said
+    assert "Error in rule" not in said and "RuleException" not in said
+
+
+def test_a_fault_of_the_configuration_is_told_without_the_place_in_the_rules(snakemake, tmp_path):
+    (tmp_path / "Snakefile").write_text(
+        "from snakemake.exceptions import WorkflowError\n"
+        "def check():\n    raise WorkflowError('Configuration of case mine: two things:\\n- a\\n- b')\n"
+        "check()\n"
+    )
+    status, said = snakemake()
+    assert status == 1 and said.endswith("Configuration of case mine: two things:\n- a\n- b\n")
+    assert "Snakefile" not in said
+
+
+def test_ctrl_c_ends_a_job_and_the_run_without_a_traceback(snakemake, tmp_path):
+    (tmp_path / "slow.py").write_text(
+        "import time\nfrom addvc.runtime import job\ntime.sleep(60)\n"
+    )
+    (tmp_path / "Snakefile").write_text(
+        "rule slow:\n    output: 'slow.txt'\n    log: 'slow.log'\n    script: 'slow.py'\n"
+    )
+    command = ["timeout", "-s", "INT", "4", sys.executable, "-m", "snakemake", "--logger", "addvc"]
+    env = os.environ | {"PYTHONPATH": str(SOURCE)}
+    done = subprocess.run(
+        [*command, "--cores", "1"], cwd=tmp_path, env=env, capture_output=True, text=True
+    )
+    assert done.returncode and "interrupted" in done.stderr
+    assert "Traceback" not in done.stderr and "Error in rule" not in done.stderr
+
+
+def test_a_dry_run_tells_the_jobs_in_a_table_or_each_with_its_reason(snakemake):
     status, said = snakemake("-n")
-    assert status == 0
-    assert "rule bad:" in said and "reason: Missing output files" in said and "Job stats:" in said
+    assert status == 0 and said.count("Job stats:") == 1
+    assert "rule bad:" not in said
+    status, said = snakemake("-n", "--verbose")
+    assert "rule bad:" in said and "reason: Missing output files" in said
 
 
 def test_nothing_to_be_done_is_said(snakemake):
@@ -113,3 +151,18 @@ def test_what_a_job_says_goes_to_its_log_and_by_choice_to_the_terminal(
     assert ("iteration 1" in said) == shown and "a tenth is missing" in said
     assert "[meso_dvc 2] iteration 1" in path.read_text()
     assert logging.getLogger("addvc").handlers == []
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("case: a\n\tporosity: .9\n", r"bad.yaml, line 2: this is not YAML .*spaces, not tabs"),
+        ("case: a\nporosity .9\nscans: b\n", r"bad.yaml, lines 2 to 3: this is not YAML"),
+        ("", r"bad.yaml: has no `key: value` in it"),
+    ],
+)
+def test_a_file_that_is_not_yaml_is_told_with_the_line(tmp_path, text, words):
+    (tmp_path / "bad.yaml").write_text(text)
+    assert re.search(words, fault(tmp_path / "bad.yaml"))
+    (tmp_path / "bad.yaml").write_text("case: a\n")
+    assert fault(tmp_path / "bad.yaml") is None

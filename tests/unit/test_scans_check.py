@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from addvc.errors import ScanError
+from addvc.errors import ConfigError, ScanError
 from addvc.images.scans import ScanFormat
 from addvc.images.scans_check import check_headers, check_scans
 
@@ -23,7 +23,7 @@ def config(reference, *states, **scans):
     """A configuration with its defaults, as far as scans go."""
     paths = {"reference": str(reference), "states": [str(path) for path in states]}
     known = {"axes": "zyx", "bin": 1, "crop": None, "voxel_size_um": 20.0}
-    return {"scans": known | paths | scans}
+    return {"loading_axis": "y", "scans": known | paths | scans}
 
 
 def write_slices(folder, pages):
@@ -119,3 +119,14 @@ def test_slices_are_opened_at_both_ends_only(tmp_path, pages, monkeypatch):
         ScanError, match=r"s020\.tif is \(36, 34\) uint16, but s000\.tif is \(37, 34\)"
     ):
         check_scans([tmp_path / "a"], ScanFormat())
+
+
+@pytest.mark.parametrize(
+    "slab", [{"low": 37}, {"low": 300, "high": 310}, {"high": 0}, {"high": -4}]
+)
+def test_a_slab_outside_the_image_is_refused(tmp_path, pages, slab):
+    np.save(tmp_path / "a.npy", pages)
+    known = config(tmp_path / "a.npy")
+    assert check_headers(known | {"micro": {"region": {"low": 30, "high": 99}}})
+    with pytest.raises(ConfigError, match=r"micro.region goes from .* image from 0 to 37 along"):
+        check_headers(known | {"micro": {"region": slab}})

@@ -10,6 +10,7 @@ sys.path.insert(0, str(WORKFLOW / "src"))
 
 from addvc import config as settings
 from addvc import studies
+from addvc.config_check import check_config
 from addvc.errors import AddvcError
 from addvc.provenance import code_hash
 
@@ -17,19 +18,21 @@ SCHEMA = WORKFLOW / "schemas/config.schema.yaml"
 
 
 def checked_config(config):
-    """The configuration with its defaults; WorkflowError says which key is wrong, and the remedy."""
+    """The configuration with its defaults; WorkflowError says which keys are wrong, and the remedy."""
     try:
         schema = yaml.safe_load(SCHEMA.read_text())
-        settings.check_keys(config, schema)
-        settings.check_values(config, schema)
-        for warning in settings.check_given(config):
-            print(f"WARNING: {warning}", file=sys.stderr)
+        warnings = check_config(config, schema)
         if settings.case_kind(config) == "twin":
             config.setdefault("twin", {})
         validate(config, str(SCHEMA))
-        settings.meso_names(config)
-        settings.truth_file(config)
         studies.check(config, list(settings.state_labels(config)))
+        if workflow.is_main_process:
+            print(
+                *(f"WARNING: {words}\n" for words in warnings),
+                sep="",
+                end="",
+                file=sys.stderr,
+            )
         if "scans" in config and workflow.is_main_process:
             from addvc.images.scans_check import check_headers  # slow to load
 

@@ -1,12 +1,12 @@
 """Strain at the scale of a cell in one state, and the bands in which it gathers."""
 
+from addvc.runtime import job
 from addvc.analysis.cell_strain import cell_strain, columns
 from addvc.analysis.localisation import MEANING, localisation
 from addvc.analysis.strut_store import write_columns
 from addvc.fem.io import read_mesh, read_vtu
 from addvc.fem.mesh import nodal_volumes
 from addvc.images.files import read_json, write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, axis = snakemake.input, snakemake.params.axis

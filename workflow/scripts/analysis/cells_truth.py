@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from addvc.runtime import job
 from addvc.analysis.cell_strain import cell_strain, columns
 from addvc.analysis.localisation import compared, localisation
 from addvc.analysis.strut_store import read_columns, write_columns
@@ -9,7 +10,6 @@ from addvc.analysis.truth import load_truth
 from addvc.fem.io import read_mesh
 from addvc.fem.mesh import nodal_volumes
 from addvc.images.files import read_json, write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, axis, state = snakemake.input, snakemake.params.axis, int(snakemake.wildcards.state)

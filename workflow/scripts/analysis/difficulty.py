@@ -1,5 +1,6 @@
 """How hard the test is: what the best field of each meso mesh would leave of each state."""
 
+from addvc.runtime import job
 from addvc.analysis.difficulty import difficulty, projections
 from addvc.analysis.truth import load_truth
 from addvc.correlation.micro import micro_reference
@@ -7,7 +8,6 @@ from addvc.fem.io import read_mesh, read_vtu
 from addvc.fem.mesh import Mesh
 from addvc.images.files import write_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, names = snakemake.input, snakemake.params.meso

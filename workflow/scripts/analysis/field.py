@@ -1,12 +1,12 @@
 """The results of one state as ParaView reads them: displacement, validity, strain, residual."""
 
+from addvc.runtime import job
 from addvc.analysis.fields import result_fields
 from addvc.analysis.noise import load_uncertainty
 from addvc.analysis.residuals import load_residual
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh, write_mesh
 from addvc.images.files import read_json
-from addvc.runtime import job
 
 with job(snakemake):
     source = snakemake.input

@@ -1,10 +1,10 @@
 """What the noise of both images alone leaves of the residual, in each state."""
 
+from addvc.runtime import job
 from addvc.analysis.image_noise import pair_noise
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_coefficients
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source = snakemake.input

@@ -1,5 +1,6 @@
 """What the noise of the images does to the displacement of micro DVC in one state."""
 
+from addvc.runtime import job
 from addvc.correlation.micro import micro_reference, shell_of, system_at_rest
 from addvc.correlation.store import save_field
 from addvc.correlation.uncertainty import Noise, fields_of_noise
@@ -7,7 +8,6 @@ from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params

@@ -1,5 +1,6 @@
 """Section 4.2.2: the residuals of one state at the points of the micro quadrature."""
 
+from addvc.runtime import job
 from addvc.analysis.residuals import residual_on, save_residual
 from addvc.correlation.micro import micro_reference
 from addvc.correlation.store import load_field
@@ -7,7 +8,6 @@ from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import write_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, made = snakemake.input, snakemake.output

@@ -1,12 +1,12 @@
 """The micro mesh cut into struts and junctions."""
 
+from addvc.runtime import job
 from addvc.analysis.strut_store import save_partition, strut_of_cells
 from addvc.analysis.struts import partition
 from addvc.fem.io import read_mesh, write_mesh
 from addvc.geometry.skeleton import strut_graph
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_volume
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source = snakemake.input

@@ -1,5 +1,6 @@
 """What every strut undergoes in a state: motion, bending, stretching, twist, their energies."""
 
+from addvc.runtime import job
 from addvc.analysis.balance import micro_fields
 from addvc.analysis.noise import turned
 from addvc.analysis.strut_frame import load_frame
@@ -10,7 +11,6 @@ from addvc.correlation.store import load_field
 from addvc.fem.io import read_vtu
 from addvc.fem.mesh import Mesh
 from addvc.images.files import write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, nu = snakemake.input, snakemake.params.nu

@@ -1,12 +1,12 @@
 """Measured struts against the truth."""
 
+from addvc.runtime import job
 from addvc.analysis.strut_store import load_partition, read_columns, write_columns
 from addvc.analysis.struts_truth import flags, judged, true_columns
 from addvc.analysis.truth import load_truth
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, results = snakemake.input, snakemake.params.results

@@ -1,9 +1,9 @@
 """The numbers of the whole case, in one file."""
 
+from addvc.runtime import job
 from addvc.analysis.summary import Scope, summarise, twin_checks
 from addvc.images.files import write_json
 from addvc.provenance import commit
-from addvc.runtime import job
 
 with job(snakemake):
     params = snakemake.params

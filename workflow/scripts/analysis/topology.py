@@ -1,5 +1,6 @@
 """Dangling stubs, necks and welds of the micro mesh."""
 
+from addvc.runtime import job
 from addvc.analysis.strut_store import load_partition
 from addvc.analysis.topology import Moved, topology
 from addvc.correlation.store import load_field
@@ -8,7 +9,6 @@ from addvc.fem.mesh import Mesh
 from addvc.geometry.skeleton import strut_graph
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_volume
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source = snakemake.input

@@ -1,10 +1,10 @@
 """The errors of one state against the known truth, at bulk nodes of the micro mesh."""
 
+from addvc.runtime import job
 from addvc.analysis.truth import errors_at, load_truth
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_vtu
 from addvc.images.files import write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     points, _, classes, _ = read_vtu(snakemake.input.mesh)

@@ -3,9 +3,9 @@
 import numpy as np
 import tifffile
 
+from addvc.runtime import job
 from addvc.analysis.twin_check import check_twin
 from addvc.images.files import read_json, write_json
-from addvc.runtime import job
 from addvc.twin import TwinOptions
 
 with job(snakemake) as log:

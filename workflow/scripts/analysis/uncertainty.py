@@ -1,5 +1,6 @@
 """The standard uncertainty of each node and strut from the noise of the images."""
 
+from addvc.runtime import job
 from addvc.analysis.noise import (
     figures,
     save_uncertainty,
@@ -9,7 +10,6 @@ from addvc.analysis.noise import (
 from addvc.analysis.strut_store import load_partition
 from addvc.correlation.store import load_field
 from addvc.images.files import write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     draws = load_field(snakemake.input.noise)

@@ -1,10 +1,10 @@
 """Whether the errors of micro DVC are those that the noise lets expect, at valid bulk nodes."""
 
+from addvc.runtime import job
 from addvc.analysis.noise import calibration, load_uncertainty
 from addvc.analysis.truth import load_truth
 from addvc.fem.io import read_vtu
 from addvc.images.files import write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, state = snakemake.input, int(snakemake.wildcards.state)

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from addvc.runtime import job
 from addvc.analysis.overlap import REST, overlap
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh
 from addvc.geometry.region import Region
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_volume
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source = snakemake.input

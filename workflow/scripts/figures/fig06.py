@@ -1,8 +1,8 @@
 """Fig. 6: the platen grid."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.slices import platen_grid
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,8 +1,8 @@
 """Fig. 7: what the blur does to the surface."""
 
+from addvc.runtime import job
 from addvc.report.anatomy import blur
 from addvc.report.case import Case
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,8 +1,8 @@
 """rms(du) of every iteration."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.curves import convergence
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,8 +1,8 @@
 """The unbiased risk of the cut-off lengths that were tried."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.curves import cutoff
-from addvc.runtime import job
 
 with job(snakemake):
     cutoff(Case.of(snakemake.params.case, snakemake.input), snakemake.output)

@@ -1,8 +1,8 @@
 """Beyond the paper: how hard the test is, as a table."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.judging import difficulty
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,8 +1,8 @@
 """Errors against the truth."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.curves import errors
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

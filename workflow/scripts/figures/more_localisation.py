@@ -1,8 +1,8 @@
 """Beyond the paper: strain at the scale of a cell, and the bands in which it gathers."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.cells import cell_strains
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,9 +1,9 @@
 """Beyond the paper: measured struts against the truth, as a picture and as a table."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.struts_truth import against_truth, truth_rows
 from addvc.report.tables import write_tables
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,9 +1,9 @@
 """Beyond the paper: dangling stubs, necks and welds of the micro mesh, as a picture and as a table."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.tables import write_tables
 from addvc.report.topology import marked, topology_rows
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

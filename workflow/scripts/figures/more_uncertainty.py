@@ -1,8 +1,8 @@
 """Beyond the paper: the standard uncertainty of each node from the noise of the images."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.uncertainty import uncertainty
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

@@ -1,8 +1,8 @@
 """Table 2: parameters of every correlation."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.tables import parameters
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)

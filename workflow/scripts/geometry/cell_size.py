@@ -1,10 +1,10 @@
 """Fig. 4: the cell size, measured or given."""
 
+from addvc.runtime import job
 from addvc.geometry.cell_size import measure_cell_size
 from addvc.images.files import read_json, write_json
 from addvc.images.scans import load_volume
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake) as log:
     volume, _ = load_volume(snakemake.input.volume)

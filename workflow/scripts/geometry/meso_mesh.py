@@ -1,12 +1,12 @@
 """Fig. 5: a meso mesh of the whole specimen."""
 
+from addvc.runtime import job
 from addvc.config import meso_size
 from addvc.fem.io import write_mesh
 from addvc.fem.mesh import check_mesh
 from addvc.geometry.meso import meso_mesh
 from addvc.images.files import read_json, write_json
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake):
     name = snakemake.wildcards.meso

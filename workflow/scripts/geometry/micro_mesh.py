@@ -1,12 +1,12 @@
 """Fig. 8: the finite elements of the struts."""
 
+from addvc.runtime import job
 from addvc.fem.io import read_vtu, write_mesh
 from addvc.geometry.micro import micro_mesh
 from addvc.geometry.region import Region
 from addvc.geometry.surface import Surface
 from addvc.images.files import read_json, write_json
 from addvc.images.scans import load_volume
-from addvc.runtime import job
 
 with job(snakemake):
     grey, notes = load_volume(snakemake.input.solid)

@@ -1,9 +1,9 @@
 """Fig. 9: nodes whose curvature is penalised, and those in equilibrium."""
 
+from addvc.runtime import job
 from addvc.fem.io import read_mesh, write_mesh
 from addvc.geometry.region import Region, node_classes
 from addvc.images.files import read_json
-from addvc.runtime import job
 
 with job(snakemake):
     mesh = read_mesh(snakemake.input.mesh)

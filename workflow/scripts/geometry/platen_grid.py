@@ -1,11 +1,11 @@
 """Fig. 6: the hexahedral grid that reaches into the platens."""
 
+from addvc.runtime import job
 from addvc.fem.io import write_mesh
 from addvc.geometry.grid import grid_lines, hex_grid
 from addvc.images.files import read_json, write_json
 from addvc.images.scans import load_volume
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake):
     shape = load_volume(snakemake.input.volume)[0].shape

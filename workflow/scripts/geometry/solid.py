@@ -2,13 +2,13 @@
 
 from dataclasses import asdict
 
+from addvc.runtime import job
 from addvc.geometry.bridges import bridged
 from addvc.geometry.region import micro_region
 from addvc.geometry.surface import region_solid
 from addvc.images.files import read_json, write_json
 from addvc.images.scans import load_volume, save_volume
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake):
     smooth, notes = load_volume(snakemake.input.smooth)

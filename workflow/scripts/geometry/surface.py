@@ -1,10 +1,10 @@
 """Fig. 7: the closed surface of the solid, by marching cubes."""
 
+from addvc.runtime import job
 from addvc.fem.io import write_vtu
 from addvc.geometry.surface import check_watertight, marching_cubes
 from addvc.images.files import read_json
 from addvc.images.scans import load_volume
-from addvc.runtime import job
 
 with job(snakemake) as log:
     grey, _ = load_volume(snakemake.input.solid)

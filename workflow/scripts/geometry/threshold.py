@@ -1,10 +1,10 @@
 """The grey level of the surface, by bisection on the porosity, or as given."""
 
+from addvc.runtime import job
 from addvc.geometry.threshold import find_threshold
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_coefficients
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake) as log:
     smooth, degree = load_coefficients(snakemake.input.smooth)

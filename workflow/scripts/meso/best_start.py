@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from addvc.runtime import job
 from addvc.correlation.candidates import candidate
 from addvc.correlation.meso import meso_options, meso_system
 from addvc.correlation.meso_start import scaled_start
@@ -10,7 +11,6 @@ from addvc.correlation.transfer import lattice_matrix
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params

@@ -2,11 +2,11 @@
 
 from dataclasses import asdict, replace
 
+from addvc.runtime import job
 from addvc.correlation.freeform import freeform, freeform_options
 from addvc.correlation.store import save_solution
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params

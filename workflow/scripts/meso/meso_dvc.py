@@ -1,12 +1,12 @@
 """Eq. 9: meso DVC on each mesh, coarse to fine, from the coarser one or the best start beside it."""
 
+from addvc.runtime import job
 from addvc.correlation.candidates import candidate, mesh_field
 from addvc.correlation.meso import cutoff_ladder, meso_dvc, meso_options
 from addvc.correlation.store import load_notes, save_solution
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from addvc.runtime import job
 from addvc.correlation.meso import pyramid_start, start_options
 from addvc.correlation.store import save_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.levels import pyramid
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     params, source = snakemake.params, snakemake.input

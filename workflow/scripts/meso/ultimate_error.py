@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from addvc.runtime import job
 from addvc.correlation.meso import meso_options, meso_system
 from addvc.correlation.store import load_notes
 from addvc.correlation.ultimate import STOP, ultimate_error
@@ -9,7 +10,6 @@ from addvc.correlation.uncertainty import Noise
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params

@@ -1,5 +1,6 @@
 """Eq. 10, or with an elastic energy: A = H + M of the micro mesh, factorised once for all states."""
 
+from addvc.runtime import job
 from addvc.correlation.micro import elastic, eq10, micro_options, micro_reference, shell_of
 from addvc.correlation.store import save_factor
 from addvc.fem.io import read_vtu
@@ -8,7 +9,6 @@ from addvc.fem.shell import load_quadrature
 from addvc.fem.solver import factorise
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params

@@ -1,9 +1,9 @@
 """A candidate start that is defined everywhere, at the nodes of the micro mesh."""
 
+from addvc.runtime import job
 from addvc.correlation.candidates import candidate
 from addvc.correlation.store import save_field
 from addvc.fem.io import read_mesh
-from addvc.runtime import job
 
 with job(snakemake):
     source, name = snakemake.input, snakemake.wildcards.field

@@ -1,5 +1,6 @@
 """Micro DVC of one state by one method, from the best start on the micro mesh."""
 
+from addvc.runtime import job
 from addvc.correlation.corotational import Problem, corotational
 from addvc.correlation.micro import ladder, mending, micro_reference, shell_of, stages
 from addvc.correlation.register import Stop, System, register
@@ -8,7 +9,6 @@ from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, method, micro = snakemake.input, snakemake.params.method, snakemake.params.micro

@@ -1,12 +1,12 @@
 """The candidate start of micro DVC with the least score, by residual and energy."""
 
+from addvc.runtime import job
 from addvc.correlation.micro import micro_options, micro_reference, robust_scale
 from addvc.correlation.micro_start import best_candidate, judge
 from addvc.correlation.store import load_field, save_field
 from addvc.fem.io import read_mesh
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params

@@ -1,10 +1,10 @@
 """The void voxels around the struts that micro DVC also looks at."""
 
+from addvc.runtime import job
 from addvc.fem.io import read_mesh
 from addvc.fem.shell import save_quadrature, shell_points
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_volume
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source = snakemake.input

@@ -1,9 +1,9 @@
 """Appendix A: meso displacements of one state at the nodes of the micro mesh."""
 
+from addvc.runtime import job
 from addvc.correlation.store import load_field, save_field
 from addvc.correlation.transfer import transfer_matrix
 from addvc.fem.io import read_mesh
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source = snakemake.input

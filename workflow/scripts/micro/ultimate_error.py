@@ -1,5 +1,6 @@
 """Table 2: the ultimate error of micro DVC, by sub-voxel shifts."""
 
+from addvc.runtime import job
 from addvc.correlation.micro import micro_reference, shell_of, system_at_rest
 from addvc.correlation.ultimate import STOP, ultimate_error
 from addvc.correlation.uncertainty import Noise
@@ -7,7 +8,6 @@ from addvc.fem.io import read_mesh
 from addvc.fem.shell import load_quadrature
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_coefficients
-from addvc.runtime import job
 
 with job(snakemake):
     source, params = snakemake.input, snakemake.params

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from addvc.runtime import job
 from addvc.images.files import atomic_path
 from addvc.report.captions import captions_page
-from addvc.runtime import job
 
 with job(snakemake):
     page = captions_page(snakemake.params.entries)

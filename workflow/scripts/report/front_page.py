@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from addvc.runtime import job
 from addvc.images.files import atomic_path, read_json, write_json
 from addvc.provenance import commit
 from addvc.report.words import front_page
-from addvc.runtime import job
 
 with job(snakemake):
     summary = read_json(snakemake.input.summary)

@@ -1,7 +1,7 @@
 """The report as one HTML file, by snakemake's own report of all figures."""
 
-from addvc.report.build import build_report
 from addvc.runtime import job
+from addvc.report.build import build_report
 
 with job(snakemake):
     build_report(

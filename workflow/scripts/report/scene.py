@@ -1,8 +1,8 @@
 """The micro result in 3D, to look around in a browser."""
 
+from addvc.runtime import job
 from addvc.report.case import Case
 from addvc.report.look_around import write_scene
-from addvc.runtime import job
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, [str(path) for path in snakemake.input])

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from addvc.fem.io import write_series
 from addvc.runtime import job
+from addvc.fem.io import write_series
 
 with job(snakemake):
     for path in snakemake.output:

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from addvc.runtime import job
 from addvc.images.files import atomic_path, read_json
 from addvc.report.words import check_verdicts, closing_lines
-from addvc.runtime import job
 
 with job(snakemake):
     summary = read_json(snakemake.input[0])

@@ -1,9 +1,9 @@
 """All scans, before any work: there, whole, of one shape."""
 
+from addvc.runtime import job
 from addvc.images.files import write_json
 from addvc.images.scans import ScanFormat
 from addvc.images.scans_check import check_scans
-from addvc.runtime import job
 
 with job(snakemake):
     settings = snakemake.params.settings

@@ -1,9 +1,9 @@
 """Eq. 8: the Gaussian pre-filter. The result holds the B-spline coefficients of Eq. 4."""
 
+from addvc.runtime import job
 from addvc.images.grey import grey_levels, matched
 from addvc.images.scans import load_volume, save_volume
 from addvc.images.spline import gaussian_blur
-from addvc.runtime import job
 
 with job(snakemake):
     source, axis, images = snakemake.input, snakemake.params.axis, snakemake.params.images

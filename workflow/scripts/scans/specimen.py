@@ -1,9 +1,9 @@
 """Where the specimen is in the reference: platens, outline."""
 
+from addvc.runtime import job
 from addvc.images.files import write_json
 from addvc.images.scans import load_volume
 from addvc.images.specimen import find_specimen
-from addvc.runtime import job
 
 with job(snakemake) as log:
     volume, _ = load_volume(snakemake.input[0])

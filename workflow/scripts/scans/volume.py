@@ -1,7 +1,7 @@
 """A scan as the binned, cropped volume that everything works on."""
 
-from addvc.images.scans import ScanFormat, open_scan, read_binned, save_volume
 from addvc.runtime import job, progress
+from addvc.images.scans import ScanFormat, open_scan, read_binned, save_volume
 
 with job(snakemake) as log:
     settings = snakemake.params.settings

@@ -1,9 +1,9 @@
 """Beyond the paper: what each parameter of micro DVC does, as a table and as a picture."""
 
+from addvc.runtime import job
 from addvc.images.files import read_json
 from addvc.report.studies import sensitivity, sensitivity_rows
 from addvc.report.tables import write_tables
-from addvc.runtime import job
 
 with job(snakemake):
     found = [read_json(path) for path in snakemake.input]

@@ -1,5 +1,6 @@
 """What one variant of micro DVC found in one state, as a row of figures."""
 
+from addvc.runtime import job
 from addvc.analysis.residuals import load_residual
 from addvc.analysis.variant import settings, variant_figures
 from addvc.correlation.micro import micro_options
@@ -7,7 +8,6 @@ from addvc.correlation.store import load_solution
 from addvc.fem.io import read_vtu
 from addvc.fem.mesh import Mesh
 from addvc.images.files import read_json, write_json
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params

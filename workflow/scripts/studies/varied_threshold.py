@@ -1,10 +1,10 @@
 """A threshold whose height above the void is that of the case times a factor."""
 
+from addvc.runtime import job
 from addvc.geometry.threshold import find_threshold
 from addvc.images.files import read_json, write_json
 from addvc.images.scans_store import load_coefficients
 from addvc.images.specimen import Specimen
-from addvc.runtime import job
 
 with job(snakemake) as log:
     source, params = snakemake.input, snakemake.params

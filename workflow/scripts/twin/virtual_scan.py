@@ -1,7 +1,7 @@
 """A virtual state: the reference scan warped by a known field, with fresh noise."""
 
-from addvc.images.scans import ScanFormat, open_scan, read_binned
 from addvc.runtime import job
+from addvc.images.scans import ScanFormat, open_scan, read_binned
 from addvc.twin import write_scan
 from addvc.twin.virtual import VirtualField, warp
 

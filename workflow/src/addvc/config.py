@@ -1,13 +1,9 @@
 """What the configuration means: names and numbers derived from it. No numerics, no imports of them."""
 
-import difflib
 import glob
 import hashlib
 import json
 from pathlib import Path
-
-from jsonschema import Draft202012Validator
-from jsonschema.exceptions import best_match
 
 from addvc.errors import ConfigError
 
@@ -72,45 +68,6 @@ def twin_folder(options: dict) -> str:
     text = json.dumps(options, sort_keys=True)
     key = hashlib.sha256(text.encode()).hexdigest()[:10]
     return f"results/.twins/{options['size']}-{options['seed']}-{key}"
-
-
-def check_given(config: dict) -> list[str]:
-    """Warnings about real scans; ConfigError when they come without their porosity."""
-    if "scans" not in config:
-        return []
-    if config.get("case", DEMO) == DEMO:
-        raise ConfigError(
-            f"`case` is {DEMO}, whose folder is the demonstration's: give your scans a case of their "
-            "own, such as `case: mine` (results go to results/mine)"
-        )
-    check_region(config.get("micro", {}).get("region", "all"))
-    platens = config["scans"].get("platens", "auto")
-    if platens == "none" and "extrapolated" in config.get("meso", {}).get("candidates", []):
-        raise ConfigError(
-            "scans.platens is none, and `extrapolated` needs the motion of the platens: leave it out of "
-            "meso.candidates, or say where the platens are"
-        )
-    if "porosity" not in config:
-        raise ConfigError(
-            "`porosity` is missing: give the share of void of your material, which "
-            "sets the threshold"
-        )
-    if case_kind(config) == "scans" and not config["scans"].get("states"):
-        return [
-            "scans.states is empty: only the reference will be worked on; list the loaded scans, "
-            "or give `virtual` to have the reference deformed by a known field"
-        ]
-    return []
-
-
-def check_region(region: str | dict) -> None:
-    """ConfigError where a slab of `micro.region` ends before it begins."""
-    wanted = {} if region == "all" else region
-    low, high = wanted.get("low"), wanted.get("high")
-    if low is not None and high is not None and low >= high:
-        raise ConfigError(
-            f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
-        )
 
 
 def truth_file(config: dict) -> str | None:
@@ -191,31 +148,6 @@ def scan_settings(config: dict, state: int) -> dict:
         "crop": scans["crop"],
         "voxel_size_um": size,
     }
-
-
-def check_keys(config: dict, schema: dict, path: str = "") -> None:
-    """ConfigError for a key that the schema does not know, with the nearest one that it does."""
-    known = schema.get("properties", {})
-    for key, value in config.items():
-        if key not in known:
-            near = difflib.get_close_matches(str(key), known, 1)
-            hint = f"did you mean `{path}{near[0]}`?" if near else "see config/README.md"
-            raise ConfigError(f"unknown key `{path}{key}`: {hint} Known here: {', '.join(known)}")
-        if isinstance(value, dict):
-            options = [known[key], *known[key].get("anyOf", [])]
-            inner = next((option for option in options if "properties" in option), None)
-            if inner:
-                check_keys(value, inner, f"{path}{key}.")
-
-
-def check_values(config: dict, schema: dict) -> None:
-    """ConfigError for the first value that the schema does not allow, in one line."""
-    error = best_match(Draft202012Validator(schema).iter_errors(config))
-    if error is None:
-        return
-    key = ".".join(map(str, error.absolute_path)) or "the configuration"
-    meaning = error.schema.get("description", "see config/README.md")
-    raise ConfigError(f"`{key}`: {error.message}. {meaning}")
 
 
 def scan_paths(config: dict) -> list[str]:

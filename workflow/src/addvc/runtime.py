@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import os
+import signal
 import sys
 import time
 import traceback
@@ -10,6 +11,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from addvc.errors import AddvcError
+
+INTERRUPTED = 130
+"""Status of a job that Ctrl-C ends, as a shell has it."""
+
+
+def _interrupted(*_) -> None:
+    sys.exit(INTERRUPTED)
+
+
+if "snakemake" in vars(sys.modules["__main__"]):
+    signal.signal(
+        signal.SIGINT, _interrupted
+    )  # from here on, hence the first import of each script
 
 
 def job_name(rule: str, wildcards: dict) -> str:
@@ -23,7 +37,7 @@ def job(snakemake) -> Iterator[logging.Logger]:
     as the scheduler gave them.
 
     An error the user can mend (AddvcError) is told in one paragraph and ends the job with status 1;
-    any other keeps its traceback, which goes to the log as well."""
+    any other keeps its traceback, which goes to the log as well; Ctrl-C ends it without one."""
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     path = Path(snakemake.log[0])
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,13 +1,17 @@
 """A line in the terminal for each job that is done, by the logger interface of Snakemake.
 
 `./addvc run` asks for it (`--logger addvc`). It takes the place of what Snakemake says in the terminal
-about jobs that go well; warnings, errors and failed logs pass as they are, a dry run as a whole, and
-`.snakemake/log` has everything. It is beside `addvc`, which knows nothing of Snakemake.
+about jobs that go well, about those that have told their error themselves, and about the place in
+the rules where a fault of the configuration was found. Other warnings, errors and failed logs pass as
+they are. A dry run shows its table of jobs (each of them with --verbose). `.snakemake/log` has
+everything. It is beside `addvc`, which knows nothing of Snakemake.
 """
 
+import re
 import sys
 import time
-from logging import WARNING, LogRecord
+from logging import ERROR, WARNING, LogRecord
+from pathlib import Path
 from typing import Any
 
 from snakemake.logging import ColorizingTextHandler
@@ -27,6 +31,27 @@ ROUTINE = (  # beginnings of messages that have no event and tell the user nothi
     "Using shell",
     "Using workflow specific",
 )
+
+CONFIGURATION = "Configuration of case "
+"""How a message on a fault of the configuration begins (rules/common.smk)."""
+
+STOPPING = "Terminating processes on user request"
+"""How Snakemake answers Ctrl-C."""
+
+
+def fault(message: str) -> str:
+    """What a message says of the configuration, without the places in the rules that it names; "" where
+    it is about something else."""
+    _, found, words = message.partition(CONFIGURATION)
+    lines = [
+        line for line in words.splitlines() if not re.match(r'  File ".*", line \d+, in ', line)
+    ]
+    return found + "\n".join(lines)
+
+
+def has_told(logs: list[str]) -> bool:
+    """Whether a failed job has put its error into its log, and so into the terminal."""
+    return any("ERROR: " in Path(path).read_text() for path in logs if Path(path).is_file())
 
 
 def job_words(rule: str, wildcards: dict[str, Any]) -> str:
@@ -59,17 +84,25 @@ class LogHandler(LogHandlerBase):
         self.start = time.monotonic()
         self.jobs: dict[int, str] = {}
         self.done = ""
+        self.stopped = self.shown = False
 
     def emit(self, record: LogRecord) -> None:
         """Tell of a record what the terminal is to show."""
-        if self.common_settings.dryrun or record.levelno >= WARNING:
-            self.show(record)
-            return
         event = getattr(record, "event", None)
-        if event is None and not str(record.msg).startswith(ROUTINE):
+        if self.stopped:
+            return
+        if str(record.msg).startswith(STOPPING):
+            self.stopped = True
+            self.say("interrupted: what was done is kept, the same command goes on from there")
+        elif record.levelno >= ERROR:
+            self.tell_error(record, event)
+        elif record.levelno >= WARNING or self.common_settings.verbose:
             self.show(record)
+        elif event is None:
+            if not str(record.msg).startswith(ROUTINE):
+                self.show(record)
         elif event == LogEvent.RUN_INFO:
-            self.say(f"{record.stats['total']} jobs to do")
+            self.tell_jobs(record)
         elif event == LogEvent.JOB_INFO:
             self.jobs[record.jobid] = job_words(record.rule_name, dict(record.wildcards or {}))
         elif event == LogEvent.JOB_FINISHED:
@@ -77,6 +110,27 @@ class LogHandler(LogHandlerBase):
         elif event == LogEvent.PROGRESS:
             share = record.done / max(record.total, 1)
             self.say(f"{record.done} of {record.total} steps ({share:.0%}) done: {self.done}")
+
+    def tell_error(self, record: LogRecord, event: LogEvent | None) -> None:
+        """An error, once: a job that has told its error itself is only named."""
+        message = str(record.msg)
+        if "At least one job did not complete" in message:
+            return
+        if event == LogEvent.JOB_ERROR and has_told(record.log):
+            self.say(f"FAILED: {self.jobs.get(record.jobid, record.rule_name)}")
+        elif words := fault(message):
+            print(words, file=self.terminal.stream, flush=True)
+        elif getattr(record, "exception", "") != "RuleException" or "CalledProcess" not in message:
+            self.show(record)
+
+    def tell_jobs(self, record: LogRecord) -> None:
+        """How many jobs there are; in a dry run, the table of them."""
+        if self.common_settings.dryrun:
+            if not self.shown:
+                self.show(record)
+            self.shown = True
+        else:
+            self.say(f"{record.stats['total']} jobs to do")
 
     def show(self, record: LogRecord) -> None:
         """A record as Snakemake shows it."""

@@ -68,8 +68,9 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
         raise GeometryError(
             f"the threshold {gamma:.1f} is within 2 standard deviations of the void "
             f"({level:.1f}, noise {noise:.1f}): it makes {np.mean(grey >= gamma):.0%} of the specimen "
-            "solid, void included; raise porosity, or give geometry.threshold; if the platens "
-            "were taken for the specimen, correct loading_axis or scans.axes"
+            "solid, void included; raise porosity, or give geometry.threshold; if struts are darker "
+            "than the void, invert the scans; if the platens were taken for the specimen, correct "
+            "loading_axis or scans.axes"
         )
     return {"void": level, "solid": float(np.median(solid)), "noise": noise}
 

@@ -4,6 +4,8 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
+from addvc.errors import ScanError
+
 BLOCK = 2**22
 
 
@@ -16,3 +18,15 @@ def content_hash(files: Iterable[str | Path]) -> str:
             while block := file.read(BLOCK):
                 digest.update(block)
     return digest.hexdigest()
+
+
+def check_different(hashes: dict[str, str]) -> None:
+    """ScanError where two scans (path -> hash) hold the same bytes: no load was between them."""
+    known: dict[str, str] = {}
+    for path, found in hashes.items():
+        if found in known:
+            raise ScanError(
+                f"{path} and {known[found]} hold the same bytes (SHA-256 {found[:12]}): one is a copy "
+                "of the other under another name; correct scans.reference or scans.states"
+            )
+        known[found] = path

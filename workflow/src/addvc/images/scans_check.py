@@ -57,7 +57,20 @@ def check_headers(config: dict) -> str:
     form = ScanFormat(**known["format"])
     found, wrong = open_all(there, form, known["bin"], known["crop"], every_slice=False)
     refuse(problems + wrong)
+    region = config.get("micro", {}).get("region", "all")
+    check_slab(region, found[0].binned["xyz".index(config["loading_axis"])])
     return described(found[0], len(found), known["voxel_size_um"], known["bin"])
+
+
+def check_slab(region: str | dict, length: int) -> None:
+    """ConfigError where the slab of `micro.region` lies outside an image of this length (voxels)."""
+    wanted = {} if region == "all" else region
+    low, high = wanted.get("low", 0), wanted.get("high", length)
+    if low >= length or high <= 0:
+        raise ConfigError(
+            f"micro.region goes from {low:g} to {high:g}, but the image from 0 to {length} along the "
+            "loading axis (voxels once cropped and binned): give a slab within that"
+        )
 
 
 def described(first: Checked, count: int, voxel_um: float, factor: int) -> str:

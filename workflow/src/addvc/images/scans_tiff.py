@@ -136,13 +136,19 @@ def _whole(path: Path) -> Iterator[None]:
     except ScanError as error:
         if not _tells_damage(messages):
             raise
-        raise ScanError(f"{path}: {messages[0]}: {_TRUNCATED}") from error
+        raise _broken(path, messages[0]) from error
     except _BROKEN as error:
-        raise ScanError(f"{path}: {error}: {_TRUNCATED}") from error
+        raise _broken(path, str(error)) from error
     finally:
         logger.removeHandler(handler)
     if _tells_damage(messages):
-        raise ScanError(f"{path}: {messages[0]}: {_TRUNCATED}")
+        raise _broken(path, messages[0])
+
+
+def _broken(path: Path, told: str) -> ScanError:
+    """That a file is not whole, with what the TIFF reader told of it."""
+    size = path.stat().st_size
+    return ScanError(f"{path}: {size} bytes: {_TRUNCATED} (the TIFF reader says: {told})")
 
 
 def _tells_damage(messages: Sequence[str]) -> bool:

@@ -1,0 +1,108 @@
+"""Every fault of a configuration is told at once, with its key, value, limit and remedy."""
+
+import pytest
+import yaml
+
+from addvc import reference
+from addvc.config_check import check_config
+from addvc.errors import ConfigError
+
+SCHEMA = yaml.safe_load(reference.SCHEMA.read_text())
+
+
+def own(**changes):
+    """A configuration of the user's own scans that nothing is wrong with, but for the changes."""
+    scans = {"reference": "a.tif", "states": ["b.tif"], "voxel_size_um": 20}
+    given = {"case": "mine", "porosity": 0.96, "loading_axis": "y", "scans": scans}
+    return {key: value for key, value in (given | changes).items() if value is not None}
+
+
+def scans(**changes):
+    return {"scans": own()["scans"] | changes}
+
+
+@pytest.mark.parametrize(
+    ("config", "key", "meant"),
+    [
+        ({"porosty": 0.96}, "porosty", "porosity"),
+        ({"meso": {"sizs": [33]}}, "meso.sizs", "meso.sizes"),
+        ({"twin": {"sed": 2417}}, "twin.sed", "twin.seed"),
+        ({"micro": {"region": {"hig": 3}}}, "micro.region.hig", "micro.region.high"),
+        ({"micro": {"lE": 3}}, "micro.lE", "micro.l_e"),
+    ],
+)
+def test_a_misspelt_key_is_told_with_the_nearest_one(config, key, meant):
+    with pytest.raises(ConfigError) as told:
+        check_config(config, SCHEMA)
+    assert f"unknown key `{key}`" in str(told.value)
+    assert f"did you mean `{meant}`?" in str(told.value)
+
+
+def test_a_key_like_no_other_gets_the_list_of_those_known():
+    with pytest.raises(ConfigError, match=r"unknown key `images\.qqqq`: see config/README") as told:
+        check_config({"images": {"qqqq": 1}}, SCHEMA)
+    assert str(told.value).endswith("Known here: blur, degree, grey")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"porosity": 96}, r"`porosity` is 96; it must be below 1 \(did you mean 0.96\?\)\. Share"),
+        (
+            {"porosity": 0.04},
+            r"`porosity` is 0.04; at least 0.3 .* not of solid \(did you mean 0.96\?",
+        ),
+        ({"porosity": None}, "`porosity` is missing: give"),
+        ({"porosity": "a lot"}, r"`porosity` is 'a lot'; it must be a number\. Share of void"),
+        ({"case": "my case"}, "`case` is 'my case'; only letters, digits"),
+        ({"case": None}, "`case` is twin, .*case: mine"),
+        ({"loading_axis": "Y"}, r"one of x, y, z \(did you mean y\?\)\. Direction of compression"),
+        (
+            {"scans": {"reference": "a.tif"}},
+            "`scans.voxel_size_um` is missing. Voxel size of the scan",
+        ),
+        (scans(voxel_size_um=0.018), "is 0.018; it must be at least 0.05. .* 18, not 0.018"),
+        (scans(voxel_size_um=18e-6), "is 1.8e-05; it must be at least 0.05"),
+        (
+            scans(crop=[[-5, 10], None, None]),
+            r"`scans.crop.0.0` is -5; it must be at least 0\. \[\[x0",
+        ),
+        (scans(states="b.tif"), r"`scans.states` is 'b.tif'; it must be a list\. Scans of"),
+        ({"micro": {"l_e": -3}}, r"`micro.l_e` is -3; it must be above 0\. Cut-off length l_E"),
+        (
+            {"micro": {"l_e": "automatic"}},
+            r"`micro.l_e` is 'automatic', which is not allowed\. Cut-off",
+        ),
+        (
+            {"micro": {"region": {"low": 80, "high": 40}}},
+            "low = 80 to high = 40; low must be below",
+        ),
+        ({"meso": {"sizes": [12, 33]}}, "must fall from coarse to fine"),
+        ({"twin": {}}, "both `twin` and `scans`"),
+    ],
+)
+def test_a_wrong_value_is_told_with_its_limit_and_what_it_means(changes, words):
+    with pytest.raises(ConfigError, match=words) as told:
+        check_config(own(**changes), SCHEMA)
+    assert "\n" not in str(told.value)
+
+
+def test_all_that_is_wrong_is_told_at_once():
+    config = own(porosity=96, porosty=0.96, loading_axis="Y", micro={"lE": 3})
+    with pytest.raises(ConfigError, match=r"^4 things are wrong:") as told:
+        check_config(config, SCHEMA)
+    assert str(told.value).count("\n- ") == 4
+    with pytest.raises(ConfigError, match=r"^2 things are wrong:"):
+        check_config(own(porosity=None, micro={"region": {"low": 80, "high": 40}}), SCHEMA)
+
+
+def test_a_right_configuration_passes():
+    assert check_config({}, SCHEMA) == []
+    assert check_config(own(micro={"region": {"low": 40}}), SCHEMA) == []
+
+
+def test_what_may_be_forgotten_is_warned_of():
+    (warning,) = check_config(own(**scans(states=[])), SCHEMA)
+    assert "scans.states is empty" in warning
+    (warning,) = check_config(own(loading_axis=None), SCHEMA)
+    assert "along y" in warning

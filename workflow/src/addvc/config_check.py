@@ -1,0 +1,220 @@
+"""What is wrong with a configuration: all of it at once, each fault with its key, value and remedy."""
+
+import difflib
+from collections.abc import Iterator
+
+from jsonschema import Draft202012Validator, ValidationError
+
+from addvc import config as settings
+from addvc.errors import ConfigError
+
+KINDS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "a text",
+    "boolean": "true or false",
+    "array": "a list",
+    "object": "a section of keys",
+}
+LIMITS = {
+    "minimum": "at least {}",
+    "maximum": "at most {}",
+    "exclusiveMinimum": "above {}",
+    "exclusiveMaximum": "below {}",
+    "minItems": "a list of at least {}",
+    "maxItems": "a list of at most {}",
+}
+
+LEAST_POROSITY = 0.3
+"""Solids with less void have no struts to look for."""
+
+
+def check_config(config: dict, schema: dict) -> list[str]:
+    """Warnings about a configuration as the user gave it, without defaults.
+
+    Raises ConfigError with every unknown key and every value the schema does not allow; where there is
+    none, with every pair of values that do not go together."""
+    refuse(list(key_faults(config, schema)) + list(value_faults(config, schema)))
+    refuse(pair_faults(config))
+    return given_warnings(config)
+
+
+def refuse(faults: list[str]) -> None:
+    """ConfigError with all faults, where there are any."""
+    if len(faults) == 1:
+        raise ConfigError(faults[0])
+    if faults:
+        lines = "".join(f"\n- {fault}" for fault in faults)
+        raise ConfigError(f"{len(faults)} things are wrong:{lines}")
+
+
+def key_faults(config: dict, schema: dict, path: str = "") -> Iterator[str]:
+    """Each key that the schema does not know, with the nearest one that it does."""
+    known = schema.get("properties", {})
+    for key, value in config.items():
+        if key not in known:
+            near = nearest(str(key), known)
+            hint = f"did you mean `{path}{near}`?" if near else "see config/README.md."
+            yield f"unknown key `{path}{key}`: {hint} Known here: {', '.join(known)}"
+        elif isinstance(value, dict):
+            options = [known[key], *known[key].get("anyOf", [])]
+            inner = next((option for option in options if "properties" in option), None)
+            if inner:
+                yield from key_faults(value, inner, f"{path}{key}.")
+
+
+def nearest(word: str, known) -> str | None:
+    """The known word most like another one, whatever its case and underscores; None if none is."""
+    plain = {str(name).lower().replace("_", ""): name for name in known}
+    near = difflib.get_close_matches(word.lower().replace("_", ""), plain, 1)
+    return plain[near[0]] if near else None
+
+
+def value_faults(config: dict, schema: dict) -> Iterator[str]:
+    """Each value that the schema does not allow, and each key that it asks for, in a line."""
+    errors = Draft202012Validator(schema).iter_errors(config)
+    for error in sorted(errors, key=lambda error: list(map(str, error.absolute_path))):
+        if error.validator != "additionalProperties":
+            yield f"{fault_words(error)}. {meaning(error, schema)}"
+
+
+def fault_words(error: ValidationError) -> str:
+    """A key, its value and the limit that it breaks."""
+    key, value = key_of(error), error.instance
+    if error.validator == "anyOf":
+        inner = [one for one in error.context if one.validator not in ("const", "enum", "type")]
+        return fault_words(inner[0]) if inner else f"`{key}` is {value!r}, which is not allowed"
+    if error.validator == "required":
+        missing = next(name for name in error.validator_value if name not in value)
+        return f"`{'.'.join([*map(str, error.absolute_path), missing])}` is missing"
+    if error.validator == "type":
+        wanted = error.validator_value
+        kinds = [wanted] if isinstance(wanted, str) else wanted
+        words = " or ".join(KINDS.get(kind, "null") for kind in kinds)
+        return f"`{key}` is {value!r}; it must be {words}"
+    if error.validator == "enum":
+        near = nearest(str(value), error.validator_value)
+        hint = f" (did you mean {near}?)" if near else ""
+        return f"`{key}` is {value!r}; it must be one of {listed(error.validator_value)}{hint}"
+    if error.validator == "pattern":
+        return f"`{key}` is {value!r}; only letters, digits, - and _ may be in it"
+    if error.validator in LIMITS:
+        limit = LIMITS[error.validator].format(error.validator_value)
+        return f"`{key}` is {value}; it must be {limit}{percent_hint(key, value)}"
+    return f"`{key}`: {error.message}"
+
+
+def key_of(error: ValidationError) -> str:
+    """The place of an error in the configuration: `scans.states.0`."""
+    return ".".join(map(str, error.absolute_path)) or "the configuration"
+
+
+def listed(values) -> str:
+    """Values as a configuration has them."""
+    return ", ".join(map(str, values))
+
+
+def percent_hint(key: str, value) -> str:
+    """A guess where a share is given in per cent."""
+    if key == "porosity" and isinstance(value, int | float) and 1 < value < 100:
+        return f" (did you mean {value / 100:g}?)"
+    return ""
+
+
+def meaning(error: ValidationError, schema: dict) -> str:
+    """What the schema says of the key that an error is about: of the one that has a description, going
+    up from the value itself."""
+    path = list(error.absolute_path)
+    if error.validator == "required":
+        path.append(next(name for name in error.validator_value if name not in error.instance))
+    words = "See config/README.md"
+    for key in path:
+        schema = (
+            schema.get("items", {}) if isinstance(key, int) else schema.get("properties", {})[key]
+        )
+        words = schema.get("description", words)
+    return words
+
+
+def pair_faults(config: dict) -> list[str]:
+    """What does not go together in a configuration whose values are each right."""
+    faults = []
+    checks = (
+        settings.case_kind,
+        check_own_case,
+        check_porosity,
+        check_region,
+        check_platens,
+        settings.truth_file,
+        lambda config: settings.meso_names({"meso": {}} | config),
+    )
+    for check in checks:
+        try:
+            check(config)
+        except ConfigError as error:
+            faults.append(str(error))
+    return list(dict.fromkeys(faults))
+
+
+def check_own_case(config: dict) -> None:
+    """ConfigError where real scans would go to the folder of the demonstration."""
+    if "scans" in config and config.get("case", settings.DEMO) == settings.DEMO:
+        raise ConfigError(
+            f"`case` is {settings.DEMO}, whose folder is the demonstration's: give your scans a case of "
+            "their own, such as `case: mine` (results go to results/mine)"
+        )
+
+
+def check_porosity(config: dict) -> None:
+    """ConfigError where real scans come without their porosity, or with that of hardly a foam."""
+    if "scans" not in config:
+        return
+    if "porosity" not in config:
+        raise ConfigError(
+            "`porosity` is missing: give the share of void of your material, which sets the threshold"
+        )
+    share = config["porosity"]
+    if share < LEAST_POROSITY:
+        raise ConfigError(
+            f"`porosity` is {share:g}; at least {LEAST_POROSITY:g} is expected of a material of struts: "
+            f"it is the share of void, not of solid (did you mean {1 - share:g}?)"
+        )
+
+
+def check_region(config: dict) -> None:
+    """ConfigError where a slab of `micro.region` ends before it begins."""
+    region = config.get("micro", {}).get("region", "all")
+    wanted = {} if region == "all" else region
+    low, high = wanted.get("low"), wanted.get("high")
+    if low is not None and high is not None and low >= high:
+        raise ConfigError(
+            f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
+        )
+
+
+def check_platens(config: dict) -> None:
+    """ConfigError where a start needs platens that there are none of."""
+    if config.get("scans", {}).get("platens") != "none":
+        return
+    if "extrapolated" in config.get("meso", {}).get("candidates", []):
+        raise ConfigError(
+            "scans.platens is none, and `extrapolated` needs the motion of the platens: leave it out of "
+            "meso.candidates, or say where the platens are"
+        )
+
+
+def given_warnings(config: dict) -> list[str]:
+    """Warnings about real scans."""
+    if "scans" not in config:
+        return []
+    found = []
+    if settings.case_kind(config) == "scans" and not config["scans"].get("states"):
+        found.append(
+            "scans.states is empty: only the reference will be worked on; list the loaded scans, "
+            "or give `virtual` to have the reference deformed by a known field"
+        )
+    if "loading_axis" not in config:
+        found.append(
+            "loading_axis is not given: compression along y, the rows of a TIFF page, is supposed"
+        )
+    return found
