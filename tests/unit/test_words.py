@@ -1,16 +1,21 @@
 """The words that go with the numbers: closing lines, front page, warnings, strictness."""
 
+import base64
 import copy
+import io
 from pathlib import Path
 
 import docutils.core
 import docutils.nodes
+import numpy as np
 import pytest
+from matplotlib.image import imread, imsave
 from snakemake.utils import validate
 
 from addvc.errors import AddvcError
 from addvc.report.doubts import strain_warnings
 from addvc.report.page_tables import results_table
+from addvc.report.thumbnail import thumbnail
 from addvc.report.words import (
     check_verdicts,
     closing_lines,
@@ -181,9 +186,20 @@ def test_the_front_page_is_valid(states):
 
 def test_the_front_page_has_its_parts_in_order():
     parts = list(sections(front_page(summary(*ALL), CONFIG, SCANS)))
-    assert parts == ["Warnings and failures", "Residual and error of each mesh", "Convergence",
-                     "Meshes", "Cost", "Methods, to paste", "Scans", "Configuration",
-                     "Versions"]  # fmt: skip
+    assert parts == ["Warnings and failures", "What next", "Residual and error of each mesh",
+                     "Convergence", "Meshes", "Methods, to paste", "Scans", "Configuration",
+                     "Cost", "Versions"]  # fmt: skip
+
+
+def test_the_front_page_holds_a_picture_and_says_what_next(tmp_path):
+    imsave(tmp_path / "figure.png", np.linspace(0, 1, 3000).reshape(30, 100))
+    page = front_page(summary(*ALL), CONFIG, SCANS, thumbnail(tmp_path / "figure.png"))
+    (image,) = docutils.core.publish_doctree(page).findall(docutils.nodes.image)
+    kind, _, data = image["uri"].partition(",")
+    assert kind == "data:image/jpeg;base64"
+    assert imread(io.BytesIO(base64.b64decode(data)), format="jpg").shape == (270, 900, 3)
+    assert "struts_state5.csv" in sections(page)["What next"]
+    assert "scans.states" in sections(front_page(summary(), CONFIG, SCANS))["What next"]
 
 
 def test_the_front_page_answers_first():
@@ -221,13 +237,17 @@ def test_a_state_says_how_well_its_nodes_are_known():
 
 def test_the_front_page_tells_of_a_band():
     band = {"normal": [0, 1, 0], "thickness": 24.6, "angle": 23.9, "flatness": 0.4,
-            "band_strain_share": 0.225, "band_volume_share": 0.131}  # fmt: skip
+            "factor": 1.5, "band_strain_share": 0.225, "band_volume_share": 0.131}  # fmt: skip
     told = front_page(summary(GOOD | {"cells": band}), CONFIG, SCANS)
-    assert "22% of the compression is in a band with 13% of the volume, 25 voxels thick" in told
+    assert (
+        "over 1.5 times the mean: 13% of the volume, with 22% of the compression, 25 voxels" in told
+    )
     assert "24 degrees" in told
     lump = front_page(summary(GOOD | {"cells": band | {"flatness": 0.9}}), CONFIG, SCANS)
     assert "a lump" in lump and "24 degrees" not in lump
-    assert "band" not in front_page(summary(GOOD | {"cells": dict.fromkeys(band)}), CONFIG, SCANS)
+    assert "times the mean" not in front_page(
+        summary(GOOD | {"cells": dict.fromkeys(band)}), CONFIG, SCANS
+    )
 
 
 def test_the_front_page_leads_to_the_scene_and_to_paraview():

@@ -362,12 +362,12 @@ def test_scans_that_are_no_images(place):
 
 
 def test_a_porosity_that_no_threshold_gives(place, results):
-    """The reference of the twin, with three quarters of its volume said to be solid."""
+    """The reference of the twin, with two thirds of its volume said to be solid."""
     rest, loaded = sorted(
         str(path.relative_to(place)) for path in place.glob("results/.twins/*/scans/state[01].tif")
     )
     scans = {"reference": rest, "states": [loaded], "bin": 2, "axes": "zyx"}
-    config = bad_case(place, "solid", scans=scans, porosity=0.25)
+    config = bad_case(place, "solid", scans=scans, porosity=0.35)
     done = snakemake(place, "results/solid/dvc/micro_factor.h5", config=config)
     refused(done, "[threshold] ERROR: the threshold", "within 2 standard deviations of the void",
             "raise porosity, or give geometry.threshold")  # fmt: skip

@@ -13,6 +13,7 @@ rule front_page:
     input:
         FIGURES,
         CAPTIONS,
+        picture=[f"{R}/figures/more_struts.png"] if STATES else [],
         summary=f"{R}/summary.json",
         scans=f"{R}/input.json",
         hashes=f"{R}/input_hashes.json",

@@ -64,6 +64,7 @@ def meso_meshes(case: Case, outputs: Iterable[str]) -> None:
         style.headline(ax, name, panel)
         counts = f"{facts['nodes']:,} nodes\n{facts['cells']:,} tetrahedra"
         style.note(ax, f"mean edge {facts['mean_edge']:.1f} voxels\n{counts}", y=-0.03)
+    style.axis_arrows(axes[0, -1], view.right, view.up)
     style.save(fig, outputs)
 
 
@@ -96,6 +97,7 @@ def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
         render([Layer(*body)], view, 56, cube, True).show(ax)
         style.headline(ax, title, panel)
     style.scale_bar(axes[0, 0], voxel_um)
+    style.axis_arrows(axes[0, -1], view.right, view.up)
     style.save(fig, outputs)
 
 
@@ -121,17 +123,20 @@ def region(case: Case, outputs: Iterable[str]) -> None:
     }
     counts = f"{facts['nodes']:,} nodes, {facts['cells']:,} tetrahedra"
     text = f"micro mesh: {counts} of {facts['mean_volume']:.2f} voxel³ in the mean"
-    _side_by_side(case, pictures, text, outputs)
+    _side_by_side(case, pictures, (view, view), text, outputs)
 
 
-def _side_by_side(case: Case, pictures: dict, text: str, outputs: Iterable[str]) -> None:
-    """Two pictures {title: picture}, each at its own scale, and words below them."""
+def _side_by_side(
+    case: Case, pictures: dict, views: tuple, text: str, outputs: Iterable[str]
+) -> None:
+    """Two pictures {title: picture}, each at its own scale and from its view, and words below them."""
     tallest = max(picture.aspect for picture in pictures.values())
-    fig, axes = style.panels(1, 2, tallest, spare=18, below=8)
+    fig, axes = style.panels(1, 2, tallest, spare=24, below=14)
     for panel, (ax, (title, picture)) in enumerate(zip(axes[0], pictures.items(), strict=True)):
         picture.show(ax)
         style.headline(ax, title, panel)
         style.scale_bar(ax, case.voxel_um())
+        style.axis_arrows(ax, views[panel].right, views[panel].up)
     fig.supxlabel(text, fontsize=8.5)
     style.save(fig, outputs)
 
@@ -168,11 +173,12 @@ def penalised(case: Case, outputs: Iterable[str]) -> None:
     axis = case.specimen.axis
     views = {"from the side": oblique(axis), "from above": oblique(axis, 35, 75)}
     tallest = max(aspect(view, mesh.points) for view in views.values())
-    fig, axes = style.panels(1, 2, tallest, spare=20, below=10)
+    fig, axes = style.panels(1, 2, tallest, spare=23, below=13)
     for panel, (ax, (name, view)) in enumerate(zip(axes[0], views.items(), strict=True)):
         render([Layer(mesh.points, faces, on_faces)], view, 80, shadows=True).show(ax)
         style.headline(ax, name, panel)
         style.scale_bar(ax, case.voxel_um())
+        style.axis_arrows(ax, view.right, view.up)
     names = ("equilibrium gap", "curvature, ends", "curvature, sides")
     handles = [
         style.line(tuple(c / 255), f"{name}, {np.sum(kind == n):,} nodes", "", "s")
@@ -196,7 +202,8 @@ def local_region(case: Case, outputs: Iterable[str]) -> None:
         "the slab alone, along its normal": render([cut], view, 80, shadows=True),
     }
     thick = f"{last - first:.1f} voxels thick ({(last - first) / size:.2f} cell size)"
-    _side_by_side(case, pictures, f"slab: {thick}, normal to {style.AXES[normal]}", outputs)
+    text = f"slab: {thick}, normal to {style.AXES[normal]}"
+    _side_by_side(case, pictures, (side, view), text, outputs)
 
 
 def _around(case: Case, box: tuple, normal: int) -> tuple[Layer, Layer]:

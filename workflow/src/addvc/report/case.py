@@ -156,7 +156,7 @@ class Case:
         if mesh != self.micro[0] or words == "failed":
             return words
         count = self.flagged(state)
-        return f"{words}, {count} struts flagged" if count else words
+        return f"{words}, {count} strut{'s' * (count > 1)} flagged" if count else words
 
     def title(self, state: int, mesh: str) -> str:
         """The label of a state, and what to think of its result on a mesh."""

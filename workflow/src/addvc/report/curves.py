@@ -76,7 +76,8 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
 
 def _state_handles(case: Case) -> list:
     """A line a state, with what became of it by the default micro method."""
-    titles = {n: case.title(n, case.micro[0]) for n in case.states}
+    name = case.micro[0]
+    titles = {n: f"{case.labels[n]}: {name} {case.verdict(name, n)}" for n in case.states}
     return [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
 
 

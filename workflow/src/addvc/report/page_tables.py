@@ -64,6 +64,12 @@ def convergence_table(summary: dict) -> list[str]:
     return list_table([*header, "last rms(du), voxel", "converged"], rows)
 
 
+CONVERGENCE_WORDS = (
+    "The coarsest mesh has no regularisation; the lengths of eq10, which every state shares, are in "
+    "Table 2."
+)
+
+
 def cutoff(result: dict) -> str:
     """l_E of a micro result of the default kind, l_L of a meso one."""
     length = result["l_e"] or result["l_l"]

@@ -18,7 +18,7 @@ from addvc.report.scene import Layer, aspect, oblique, render
 
 BINS = np.linspace(0, 1, 21)
 COMPARED = ("bending_share", "axial_strain")
-PALE_GREY, GREY = "#e3e3e3", "#9a9a9a"
+GREY = "#9a9a9a"
 PALE = (1.0, 0.45, 0.15)
 """How full the colours of bending, stretching and torsion are."""
 
@@ -28,7 +28,7 @@ TRUTHS = ("_beams", "_field")
 
 def network(case: Case, outputs: Iterable[str]) -> None:
     """Every strut in the reference, micro beside meso: (top) share of bending, (bottom) axial strain,
-    of the last state that was found; struts that cannot be trusted are grey."""
+    of the last state that was found; struts that cannot be trusted are magenta."""
     state, view = case.shown_state(), oblique(case.specimen.axis)
     struts, junctions = load_partition(case.path("geometry/struts.h5"))
     table = read_columns(case.path(f"struts_state{state}.csv"))
@@ -40,14 +40,14 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     fig, axes = style.panels(2, 2, aspect(view, points), spare=13, bar=16)
     for row, (ax, column) in enumerate(zip(axes, COMPARED, strict=True)):
         valid = table["valid"] > 0
-        norm = Normalize(0, 1) if row == 0 else strain_range(table, sources.values())
+        norm = Normalize(0, 1) if row == 0 else strain_range(table)
         cmap = style.MAGNITUDE if row == 0 else style.SIGNED
         for panel, (name, suffix) in enumerate(sources.items()):
             values = np.where(valid, table[column + suffix], np.nan)[owner]
             known = np.isfinite(values) & (owner != FREE_END)
             layers = [
                 Layer(points, faces[known], values=values[known], norm=norm, cmap=cmap),
-                Layer(points, faces[~known & (owner != FREE_END)], colour=PALE_GREY, opacity=0.6),
+                Layer(points, faces[~known & (owner != FREE_END)], colour=style.DOUBT),
                 Layer(points, faces[owner == FREE_END], colour=GREY),
             ]
             render(layers, view, style.WIDTH / 2, points, shadows=True).show(ax[panel])
@@ -58,7 +58,7 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     style.scale_bar(axes[1, 0], case.voxel_um(), 0.4)
     style.axis_arrows(axes[1, 1], view.right, view.up)
     handles = [
-        Patch(color=PALE_GREY, label="not to be trusted"),
+        Patch(color=style.DOUBT, label="in doubt"),
         Patch(color=GREY, label="junction"),
     ]
     fig.legend(handles=handles, loc="outside lower center", ncols=2)
@@ -72,12 +72,11 @@ def without_struts() -> Figure:
     return fig
 
 
-def strain_range(table: dict[str, np.ndarray], suffixes: Iterable[str]) -> Normalize:
-    """Range of the axial strains of the valid struts, of all results, about zero."""
-    valid = table["valid"] > 0
-    return style.robust_range(
-        [np.r_[table[f"axial_strain{s}"][valid], 0] for s in suffixes], signed=True, share=2.5
-    )
+def strain_range(table: dict[str, np.ndarray]) -> Normalize:
+    """Range of the axial strains of the valid struts by micro DVC, about zero: those by meso DVC, many
+    times as large, would leave nothing to see of them."""
+    known = table["axial_strain"][table["valid"] > 0]
+    return style.robust_range([np.r_[known, 0]], signed=True, share=2.5)
 
 
 def tubes(struts: list[Strut], junctions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

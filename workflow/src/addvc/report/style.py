@@ -196,7 +196,7 @@ def axis_arrows(ax: Axes, right: np.ndarray, up: np.ndarray, y: float = -0.025) 
     below its right end at `y` over its height; none for an axis that points at the viewer."""
     below = ax.transAxes + ScaledTranslation(0, -1.2 * ARROW / 72, ax.figure.dpi_scale_trans)
     for name, *along in zip(AXES, right, up, strict=True):
-        if np.hypot(*along) < 0.2:
+        if np.hypot(*along) < 0.35:
             continue
         for text, length, arrow in (("", ARROW, ARROWHEAD), (name, 1.5 * ARROW, None)):
             tip = length * np.array(along)

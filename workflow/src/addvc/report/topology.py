@@ -48,10 +48,11 @@ def marked(case: Case, outputs: Iterable[str]) -> None:
     balls = [ball(at, KINDS[kind][1]) for kind, at in where.items() if len(at)]
     views = [oblique(case.specimen.axis, azimuth) for azimuth in TURNS]
     pictures = [render([foam, *balls], view, style.WIDTH / 2, points) for view in views]
-    fig, axes = style.panels(1, 2, pictures[0].aspect, spare=19, below=8)
+    fig, axes = style.panels(1, 2, pictures[0].aspect, spare=25, below=14)
     for number, (ax, picture) in enumerate(zip(axes[0], pictures, strict=True)):
         picture.show(ax)
         style.headline(ax, "from one side" if number == 0 else "from a quarter turn on", number)
+        style.axis_arrows(ax, views[number].right, views[number].up)
     style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
     handles = [
         style.line(colour, f"{name}: {len(where[kind])}", "", "o")

@@ -50,6 +50,7 @@ def _draw_warped(bodies: dict, words: list, view: View, voxel_um: float, outputs
             _outline(ax, render([Layer(*surfaces[1], "#000000")], view, 82, fit))
             style.note(ax, words[panel - 2], y=-0.02)
     style.scale_bar(axes[0, 0], voxel_um, 0.2)
+    style.axis_arrows(axes[0, 1], view.right, view.up)
     style.save(fig, outputs)
 
 

@@ -1,11 +1,14 @@
 """The words that go with the numbers: closing lines in the terminal, front page of the report."""
 
+import textwrap
+
 import yaml
 
 from addvc.errors import AddvcError
 from addvc.report.doubts import failed_checks, warnings
 from addvc.report.methods import methods
 from addvc.report.page_tables import (
+    CONVERGENCE_WORDS,
     RESIDUAL_WORDS,
     convergence_table,
     cost_table,
@@ -71,19 +74,21 @@ def heading(text: str, line: str = "-") -> list[str]:
     return ["", text, line * len(text), ""]
 
 
-def front_page(summary: dict, config: dict, scans: dict) -> str:
-    """First page of the report (reStructuredText): the answer, what to distrust, the provenance."""
+def front_page(summary: dict, config: dict, scans: dict, picture: str | None = None) -> str:
+    """First page of the report (reStructuredText): the answer, what to distrust, what to do next, the
+    provenance; picture: one to show with the answer, as the address of an image."""
     lines = heading(f"addvc: case {summary['case']}", "=")
-    lines += answer(summary) + look_around(summary)
+    lines += answer(summary) + shown(picture, summary) + look_around(summary)
     lines += heading("Warnings and failures") + warnings(summary)
+    lines += heading("What next") + what_next(summary)
     lines += [*heading("Residual and error of each mesh"), RESIDUAL_WORDS, *results_table(summary)]
-    lines += heading("Convergence") + convergence_table(summary)
+    lines += [*heading("Convergence"), CONVERGENCE_WORDS, *convergence_table(summary)]
     lines += heading("Meshes") + meshes_table(summary)
-    lines += heading("Cost") + cost_table(summary["cost"])
     lines += heading("Methods, to paste") + methods(summary, config, scans)
     lines += heading("Scans") + scans_table(scans) + hashes_list(scans.get("sha256", {}))
     lines += [*heading("Configuration"), "::", ""]
     lines += ["   " + line for line in yaml.safe_dump(config, sort_keys=False).splitlines()]
+    lines += heading("Cost") + cost_table(summary["cost"])
     lines += heading("Versions")
     lines += [", ".join(f"{name} {number}" for name, number in summary["versions"].items())]
     return "\n".join(lines) + "\n"
@@ -108,6 +113,36 @@ def answer(summary: dict) -> list[str]:
             f"{strut_words(state.get('struts'))}" + band_words(state.get("cells"))
         )
     return [*lines, "", cost_words(summary["cost"])]
+
+
+def shown(picture: str | None, summary: dict) -> list[str]:
+    """A picture of the answer with a caption, where there is one."""
+    if picture is None:
+        return []
+    caption = (
+        f"Struts coloured by what they undergo, by {micro_name(summary)} (left) and by the finest meso "
+        "result (right): see more_struts among the figures."
+    )
+    address = textwrap.wrap(picture, 1000, initial_indent=".. image:: ", subsequent_indent="   ")
+    return ["", *address, "   :width: 450px", "", caption]
+
+
+def what_next(summary: dict) -> list[str]:
+    """Where to look first, and which file has what."""
+    if not summary["states"]:
+        return ["List the loaded scans in `scans.states`, and give the same command."]
+    name, last = micro_name(summary), summary["states"][-1]["state"]
+    return [
+        "- Is it right? Fig. 13: pale everywhere. Fig. 16: the carried struts lie in the outline of the "
+        "image. What is not so is in doubt, above or as `valid` 0 in the files.",
+        "- What moved? Fig. 11 and 15, and the scene.",
+        "- How do struts carry the load? more_bending and more_struts among the figures; a row for each "
+        f"strut in ``struts_state{last}.csv``, what its columns mean in ``struts_state{last}.json``.",
+        "- Where does strain gather? more_localisation, and ``cells_state*.csv``.",
+        f"- Your own analysis: ``fields/{name}_state*.vtu`` (ParaView, pyvista, meshio) has "
+        "displacement, strain, residual and `valid` of every node; ``summary.json`` all of "
+        "the figures of this page.",
+    ]
 
 
 def state_words(state: dict) -> str:
@@ -174,8 +209,8 @@ def band_words(cells: dict | None) -> str:
         else "a lump rather than a plate"
     )
     return (
-        f" {cells['band_strain_share']:.0%} of the compression is in a band with "
-        f"{cells['band_volume_share']:.0%} of the volume, {shape}."
+        f" Compressed by over {cells['factor']:g} times the mean: {cells['band_volume_share']:.0%} of "
+        f"the volume, with {cells['band_strain_share']:.0%} of the compression, {shape}."
     )
 
 
