@@ -160,11 +160,11 @@ def _square(x: np.ndarray) -> np.ndarray:
 def colour_bar(
     fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options
 ) -> None:
-    """A colour bar, its ends pointed unless `extend` says otherwise, since ranges are robust; its width
-    is left to the layout."""
+    """A colour bar, its ends pointed unless `extend` says otherwise, since ranges are robust; that colours
+    follow a root is said; its width is left to the layout."""
     mappable = ScalarMappable(norm, cmap)
     bar = fig.colorbar(mappable, ax=axes, extendfrac=0.03, **({"extend": "both"} | options))
-    bar.set_label(label)
+    bar.set_label(f"{label}\nroot scale" if isinstance(norm, FuncNorm) else label)
     bar.ax.tick_params(length=2.5, width=0.6)
     bar.outline.set_linewidth(0.5)
 
