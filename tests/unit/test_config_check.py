@@ -77,6 +77,11 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
             {"micro": {"region": {"low": 80, "high": 40}}},
             "low = 80 to high = 40; low must be below",
         ),
+        (
+            {"meso": {"candidates": ["previous"]}},
+            "at least one of zero, platens, freeform",
+        ),
+        ({"meso": {"candidates": ["zero", "zero"]}}, "nothing may be in it twice"),
         ({"meso": {"sizes": [12, 33]}}, "must fall from coarse to fine"),
         ({"twin": {}}, "both `twin` and `scans`"),
     ],
@@ -94,6 +99,13 @@ def test_all_that_is_wrong_is_told_at_once():
     assert str(told.value).count("\n- ") == 4
     with pytest.raises(ConfigError, match=r"^2 things are wrong:"):
         check_config(own(porosity=None, micro={"region": {"low": 80, "high": 40}}), SCHEMA)
+
+
+def test_every_missing_key_and_a_section_left_empty_are_told():
+    with pytest.raises(ConfigError, match=r"reference` is missing[\s\S]*voxel_size_um` is missing"):
+        check_config(own(scans={}), SCHEMA)
+    with pytest.raises(ConfigError, match=r"`micro` is empty; it must be a section of keys"):
+        check_config({"micro": None}, SCHEMA)
 
 
 def test_a_right_configuration_passes():

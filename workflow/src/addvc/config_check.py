@@ -80,28 +80,38 @@ def value_faults(config: dict, schema: dict) -> Iterator[str]:
 
 def fault_words(error: ValidationError) -> str:
     """A key, its value and the limit that it breaks."""
-    key, value = key_of(error), error.instance
-    if error.validator == "anyOf":
-        inner = [one for one in error.context if one.validator not in ("const", "enum", "type")]
-        return fault_words(inner[0]) if inner else f"`{key}` is {value!r}, which is not allowed"
-    if error.validator == "required":
-        missing = next(name for name in error.validator_value if name not in value)
-        return f"`{'.'.join([*map(str, error.absolute_path), missing])}` is missing"
-    if error.validator == "type":
-        wanted = error.validator_value
-        kinds = [wanted] if isinstance(wanted, str) else wanted
-        words = " or ".join(KINDS.get(kind, "null") for kind in kinds)
-        return f"`{key}` is {value!r}; it must be {words}"
-    if error.validator == "enum":
-        near = nearest(str(value), error.validator_value)
-        hint = f" (did you mean {near}?)" if near else ""
-        return f"`{key}` is {value!r}; it must be one of {listed(error.validator_value)}{hint}"
-    if error.validator == "pattern":
-        return f"`{key}` is {value!r}; only letters, digits, - and _ may be in it"
-    if error.validator in LIMITS:
-        limit = LIMITS[error.validator].format(error.validator_value)
-        return f"`{key}` is {value}; it must be {limit}{percent_hint(key, value)}"
+    key, value, limit = key_of(error), error.instance, error.validator_value
+    given = "empty" if value is None else repr(value)
+    match error.validator:
+        case "anyOf":
+            inner = [one for one in error.context if one.validator not in ("const", "enum", "type")]
+            return fault_words(inner[0]) if inner else f"`{key}` is {given}, which is not allowed"
+        case "required":
+            return f"`{'.'.join(map(str, place(error)))}` is missing"
+        case "type":
+            kinds = [limit] if isinstance(limit, str) else limit
+            words = " or ".join(KINDS.get(kind, "null") for kind in kinds)
+            return f"`{key}` is {given}; it must be {words}"
+        case "enum":
+            near = nearest(str(value), limit)
+            hint = f" (did you mean {near}?)" if near else ""
+            return f"`{key}` is {given}; it must be one of {listed(limit)}{hint}"
+        case "contains":
+            return f"`{key}` is {given}; at least one of {listed(limit['enum'])} must be in it"
+        case "uniqueItems":
+            return f"`{key}` is {given}; nothing may be in it twice"
+        case "pattern":
+            return f"`{key}` is {given}; only letters, digits, - and _ may be in it"
+        case name if name in LIMITS:
+            words = LIMITS[name].format(limit)
+            return f"`{key}` is {given}; it must be {words}{percent_hint(key, value)}"
     return f"`{key}`: {error.message}"
+
+
+def place(error: ValidationError) -> list:
+    """The keys and numbers that lead to what an error is about: to the value, or to a missing key."""
+    path = list(error.absolute_path)
+    return [*path, error.message.split("'")[1]] if error.validator == "required" else path
 
 
 def key_of(error: ValidationError) -> str:
@@ -124,11 +134,8 @@ def percent_hint(key: str, value) -> str:
 def meaning(error: ValidationError, schema: dict) -> str:
     """What the schema says of the key that an error is about: of the one that has a description, going
     up from the value itself."""
-    path = list(error.absolute_path)
-    if error.validator == "required":
-        path.append(next(name for name in error.validator_value if name not in error.instance))
     words = "See config/README.md"
-    for key in path:
+    for key in place(error):
         schema = (
             schema.get("items", {}) if isinstance(key, int) else schema.get("properties", {})[key]
         )

@@ -160,8 +160,8 @@ def _square(x: np.ndarray) -> np.ndarray:
 def colour_bar(
     fig: Figure, axes, norm: Normalize, cmap: str | Colormap, label: str, **options
 ) -> None:
-    """A colour bar, its ends pointed unless `extend` says otherwise, since ranges are robust; that colours
-    follow a root is said; its width is left to the layout."""
+    """A colour bar, its ends pointed unless `extend` says otherwise, since ranges are robust; a root
+    scale is named; its width is left to the layout."""
     mappable = ScalarMappable(norm, cmap)
     bar = fig.colorbar(mappable, ax=axes, extendfrac=0.03, **({"extend": "both"} | options))
     bar.set_label(f"{label}\nroot scale" if isinstance(norm, FuncNorm) else label)
