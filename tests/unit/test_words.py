@@ -226,6 +226,11 @@ def test_an_extension_or_a_falling_strain_is_warned_of():
     told = " ".join(strain_warnings({"states": states}))
     assert "longer, by 40.0% in state 1" in told and "loading_axis" in told
     assert not strain_warnings({"states": [dict(GOOD, state=1, strain=0.0)]})
+    for strains, told in (({"x": -0.01, "y": 0.01, "z": 0.05}, "most along z, by 5.0%"),
+                          ({"x": -0.02, "y": 0.05, "z": 0.01}, "")):  # fmt: skip
+        state = dict(GOOD, state=1, strain=strains["y"], strain_axes=strains)
+        assert told in "".join(strain_warnings({"states": [state]}))
+        assert bool(strain_warnings({"states": [state]})) == bool(told)
     assert state_words(states[1] | {"label": "state 2"}) == "2 (40.0% extension measured)"
 
 

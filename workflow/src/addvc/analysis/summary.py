@@ -89,18 +89,20 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
 
 
 def state_figures(folder: Path, state: int, scope: Scope) -> dict:
-    """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh."""
+    """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh along the
+    loading axis and each other one."""
     micro, axis = next(mesh for mesh in scope.meshes if mesh.startswith("micro")), scope.axis
     result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.meshes}
     points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")
     trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
-    strain = compression(points[trusted, axis], point["displacement"][trusted, axis])
+    strains = [compression(points[trusted, d], point["displacement"][trusted, d]) for d in range(3)]
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
     micro_notes = load_notes(folder / f"dvc/micro_start_state{state}.h5")
     struts = read_json(folder / f"struts_state{state}.json")
     return result | {
-        "strain": strain,
+        "strain": strains[axis],
+        "strain_axes": dict(zip("xyz", strains, strict=True)),
         "start": notes["best"],
         "candidates": notes["candidates"],
         "micro_start": micro_notes["best"],
@@ -153,7 +155,7 @@ def freeform_figures(folder: Path, state: int, truth: bool) -> dict:
 
 def compression(position: np.ndarray, displacement: np.ndarray) -> float:
     """Overall compression: by how much the two end faces (a twentieth of the height) come nearer,
-    over their distance; coordinates (n,) along the loading axis, voxels."""
+    over their distance; coordinates (n,) along one axis, voxels."""
     low, high = position.min(), position.max()
     near = 0.05 * (high - low)
     bottom, top = position <= low + near, position >= high - near

@@ -39,7 +39,7 @@ def strain_warnings(summary: dict) -> list[str]:
     strains = {state["state"]: state["strain"] for state in summary["states"]}
     longer = [number for number, strain in strains.items() if strain < -STRETCHED]
     falls = [n for n in strains if strains[n] < strains.get(n - 1, strains[n]) - STRETCHED]
-    found = []
+    found = axis_warnings(summary)
     for n in longer[:1]:
         found.append(
             f"- The specimen gets longer, by {-strains[n]:.1%} in state {n} (at most {STRETCHED:.1%} in "
@@ -53,6 +53,20 @@ def strain_warnings(summary: dict) -> list[str]:
             "not in the order of loading."
         )
     return found
+
+
+def axis_warnings(summary: dict) -> list[str]:
+    """One line where the specimen is compressed most along another axis than that of the load."""
+    for state in summary["states"]:
+        strains = state.get("strain_axes") or {"": state["strain"]}
+        most = max(strains, key=strains.get)
+        if strains[most] > max(state["strain"], 0) + STRETCHED:
+            return [
+                f"- In state {state['state']} the specimen is compressed most along {most}, by "
+                f"{strains[most]:.1%}, and by {state['strain']:.1%} along the loading axis: unless it was "
+                f"squeezed from the side, say `loading_axis: {most}`, or correct scans.axes."
+            ]
+    return []
 
 
 def topology_warnings(counts: dict | None) -> list[str]:
