@@ -89,8 +89,8 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
 
 
 def state_figures(folder: Path, state: int, scope: Scope) -> dict:
-    """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh along the
-    loading axis and each other one."""
+    """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh,
+    along the loading axis and each other one."""
     micro, axis = next(mesh for mesh in scope.meshes if mesh.startswith("micro")), scope.axis
     result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.meshes}
     points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")

@@ -63,8 +63,8 @@ def axis_warnings(summary: dict) -> list[str]:
         if strains[most] > max(state["strain"], 0) + STRETCHED:
             return [
                 f"- In state {state['state']} the specimen is compressed most along {most}, by "
-                f"{strains[most]:.1%}, and by {state['strain']:.1%} along the loading axis: unless it was "
-                f"squeezed from the side, say `loading_axis: {most}`, or correct scans.axes."
+                f"{strains[most]:.1%}, and by {state['strain']:.1%} along the loading axis: unless it "
+                f"was squeezed from the side, say `loading_axis: {most}`, or correct scans.axes."
             ]
     return []
 
