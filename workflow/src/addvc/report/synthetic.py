@@ -68,6 +68,7 @@ def network(case: Case, outputs: Iterable[str], files: list[str]) -> None:
         render([layer], view, style.WIDTH / columns, fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state], panel)
     style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
+    style.axis_arrows(axes[0, -1], view.right, view.up)
     label = "bending energy per length of the strut, over its mean (–)"
     style.colour_bar(fig, axes, norm, "plasma", label, shrink=0.6)
     style.save(fig, outputs)
