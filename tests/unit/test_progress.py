@@ -114,6 +114,22 @@ def test_ctrl_c_ends_a_job_and_the_run_without_a_traceback(snakemake, tmp_path):
     assert "Traceback" not in done.stderr and "Error in rule" not in done.stderr
 
 
+@pytest.mark.parametrize("ignored", [True, False])
+def test_a_signal_that_is_ignored_ends_no_job(tmp_path, ignored):
+    (tmp_path / "self.py").write_text(
+        "import os, signal\nfrom addvc.runtime import job\n"
+        "os.kill(os.getpid(), signal.SIGINT)\nopen(snakemake.output[0], 'w').close()\n"
+    )
+    (tmp_path / "Snakefile").write_text("rule one:\n    output: 'one.txt'\n    script: 'self.py'\n")
+    command = [sys.executable, "-m", "snakemake", "--cores", "1"]
+    if ignored:
+        command = ["sh", "-c", 'trap "" INT; exec "$@"', "sh", *command]
+    env = os.environ | {"PYTHONPATH": str(SOURCE)}
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
+    assert (done.returncode == 0) == ignored == (tmp_path / "one.txt").exists()
+    assert "Traceback" not in done.stderr
+
+
 def test_a_dry_run_tells_the_jobs_in_a_table_or_each_with_its_reason(snakemake):
     status, said = snakemake("-n")
     assert status == 0 and said.count("Job stats:") == 1

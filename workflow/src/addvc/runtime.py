@@ -20,10 +20,12 @@ def _interrupted(*_) -> None:
     sys.exit(INTERRUPTED)
 
 
-if "snakemake" in vars(sys.modules["__main__"]):
-    signal.signal(
-        signal.SIGINT, _interrupted
-    )  # from here on, hence the first import of each script
+# From here on, hence the first import of each script; not where it is ignored, as under nohup.
+if (
+    "snakemake" in vars(sys.modules["__main__"])
+    and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+):
+    signal.signal(signal.SIGINT, _interrupted)
 
 
 def job_name(rule: str, wildcards: dict) -> str:
