@@ -72,6 +72,7 @@ def test_a_failed_job_is_told_in_full_and_the_status_stays(snakemake, tmp_path):
 def test_what_is_wrong_before_any_job_is_told(snakemake, tmp_path):
     status, said = snakemake("nothing.txt")
     assert status == 1 and "nothing.txt" in said and "MissingRuleException" in said
+    assert "A target is `ablation`" in said
     (tmp_path / "Snakefile").write_text(
         "from snakemake.exceptions import WorkflowError\nraise WorkflowError('the remedy')\n"
     )

@@ -35,6 +35,9 @@ ROUTINE = (  # beginnings of messages that have no event and tell the user nothi
 CONFIGURATION = "Configuration of case "
 """How a message on a fault of the configuration begins (rules/common.smk)."""
 
+TARGETS = "A target is `ablation`, `sensitivity` or a file below results/CASE: see ./addvc help."
+"""What may stand after `./addvc run`."""
+
 STOPPING = "Terminating processes on user request"
 """How Snakemake answers Ctrl-C."""
 
@@ -122,6 +125,8 @@ class LogHandler(LogHandlerBase):
             print(words, file=self.terminal.stream, flush=True)
         elif getattr(record, "exception", "") != "RuleException" or "CalledProcess" not in message:
             self.show(record)
+            if getattr(record, "exception", "") == "MissingRuleException":
+                print(TARGETS, file=self.terminal.stream, flush=True)
 
     def tell_jobs(self, record: LogRecord) -> None:
         """How many jobs there are; in a dry run, the table of them."""
