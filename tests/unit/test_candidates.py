@@ -57,7 +57,7 @@ def source(tmp_path, box):
         ("deformed_before", (6, 34)),
         ("deformed", (7, 32)),
     ):
-        save_volume(files[name], between(*faces), 1.0)
+        save_volume(files[name], between(*faces))
     return files
 
 
@@ -81,7 +81,7 @@ def test_extrapolation_goes_by_what_the_platens_moved(source, points):
 
 
 def test_extrapolation_without_platens_says_what_to_do(source, points, speckle):
-    save_volume(source["deformed"], speckle((24, 40, 24)), 1.0)
+    save_volume(source["deformed"], speckle((24, 40, 24)))
     with pytest.raises(CorrelationError, match="leave `extrapolated` out of meso"):
         candidate("extrapolated", source, AXIS)
 

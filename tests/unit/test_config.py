@@ -148,14 +148,15 @@ def test_how_a_scan_is_read():
     }
     scans = raw | {"voxel_size_um": 6.67, "bin": 3, "crop": [[0, 9], None, None]}
     given = settings.scan_settings({"scans": scans}, 1)
-    assert given == {"format": raw, "bin": 3, "crop": scans["crop"], "voxel_size_um": 6.67}
+    assert given == {"format": raw, "bin": 3, "crop": scans["crop"]}
 
     made = settings.scan_settings({"scans": scans, "virtual": {}}, 1)
-    assert made == {"format": {"axes": "zyx"}, "bin": 3, "crop": None, "voxel_size_um": 6.67}
+    assert made == {"format": {"axes": "zyx"}, "bin": 3, "crop": None}
     assert settings.scan_settings({"scans": scans, "virtual": {}}, 0) == given
 
     twin = settings.scan_settings({"twin": {"bin": 3}}, 2)
-    assert twin["voxel_size_um"] * twin["bin"] == pytest.approx(20.01)
+    assert settings.voxel_size_um({"twin": {"bin": 3}}) * twin["bin"] == pytest.approx(20.01)
+    assert settings.voxel_size_um({"scans": scans}) == 6.67
 
 
 # ---------------------------------------------------------------------- schema and shipped

@@ -29,7 +29,8 @@ from addvc.report import (
 )
 from addvc.report.case import Case, UndeclaredInput
 
-DESCRIPTION = {"labels": {1: "3.4 %", 2: "5.2 %"}, "meso": ["meso9"], "micro": ["micro"]}
+DESCRIPTION = {"labels": {1: "3.4 %", 2: "5.2 %"}, "meso": ["meso9"], "micro": ["micro"],
+               "voxel_um": 20.0}  # fmt: skip
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def folder(tmp_path, cube):
     write_json(tmp_path / "geometry/meso9.json", {"nodes": 1, "cells": 1, "mean_edge": 9.0})
     write_vtu(tmp_path / "geometry/meso9.vtu", cube.points, cube.cells)
     write_json(tmp_path / "analysis/image_noise.json", {"1": 1.4, "2": None})
-    save_volume(tmp_path / "volumes/smooth0.h5", rng.random((9, 11, 13)), 20.0)
+    save_volume(tmp_path / "volumes/smooth0.h5", rng.random((9, 11, 13)))
     for state, flagged in ((1, 5), (2, 0)):
         foam = {"micro": {"valid": 7, "flagged": flagged, "bending_share": None}}
         write_json(tmp_path / f"struts_state{state}.json", {"foam": foam})

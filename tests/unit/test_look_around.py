@@ -40,7 +40,7 @@ def case(tmp_path, bar):
                {"kind": "box", "axis": 1, "low": 0.0, "high": 24.0, "centre": [4, 4],
                 "radius": None, "bounds": [[0, 8], [0, 8]]})  # fmt: skip
     write_vtu(tmp_path / "geometry/micro.vtu", bar.points, bar.cells)
-    save_volume(tmp_path / "volumes/smooth0.h5", np.zeros((9, 25, 9)), 20.0)
+    save_volume(tmp_path / "volumes/smooth0.h5", np.zeros((9, 25, 9)))
     struts = [strut(bar, 1, 11), strut(bar, 15, 23)]
     save_partition(tmp_path / "geometry/struts.h5", struts, np.zeros((0, 3)))
     for state in (1, 2):
@@ -56,7 +56,15 @@ def case(tmp_path, bar):
         write_columns(tmp_path / f"struts_state{state}.csv",
                       {"valid": [1, 0], "bending_share": [0.75, 0.5]})  # fmt: skip
     labels = {1: "5 %", 2: "10 %"}
-    return Case.of({"root": tmp_path, "labels": labels, "meso": ["meso9"], "micro": ["micro"]})
+    return Case.of(
+        {
+            "root": tmp_path,
+            "labels": labels,
+            "meso": ["meso9"],
+            "micro": ["micro"],
+            "voxel_um": 20.0,
+        }
+    )
 
 
 def strut(mesh, low, high):

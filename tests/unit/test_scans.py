@@ -277,12 +277,12 @@ def test_sizes_are_checked_before_reading(tmp_path, pages, factor, crop, message
 
 def test_volume_round_trip(tmp_path, volume):
     path = tmp_path / "deep" / "volume.h5"
-    save_volume(path, volume, 20.01, {"bin": 3, "state": "reference", "crop": [1, 2]})
+    save_volume(path, volume, {"bin": 3, "state": "reference", "crop": [1, 2]})
     found, attrs = load_volume(path)
     assert found.dtype == np.float32
     assert_array_equal(found, volume)
     given = {"bin": 3, "state": "reference", "crop": [1, 2]}
-    assert attrs == {**given, "axes": "xyz", "voxel_size_um": 20.01, "unit": "um"}
+    assert attrs == {**given, "axes": "xyz"}
     assert [file.name for file in path.parent.iterdir()] == ["volume.h5"]
     assert_array_equal(read_binned(open_scan(path, ScanFormat(axes="xyz"))), volume)
 

@@ -625,7 +625,15 @@ def test_figures_against_the_truth_become_rows_with_units(tmp_path):
                   {"valid": np.ones(4)})  # fmt: skip
         write_json(tmp_path / f"struts_state{state}.json", {"foam": {"micro": {"flagged": 3}}})
     labels = {1: "3.4 %", 2: "5.2 %"}
-    case = Case.of({"root": tmp_path, "labels": labels, "meso": ["meso9"], "micro": ["micro"]})
+    case = Case.of(
+        {
+            "root": tmp_path,
+            "labels": labels,
+            "meso": ["meso9"],
+            "micro": ["micro"],
+            "voxel_um": 20.0,
+        }
+    )
     rows = truth_rows(case)
     assert {len(row) for row in rows} == {6}
     verdicts = ["converged, 3 struts flagged", "not converged, 3 struts flagged"]

@@ -27,8 +27,8 @@ def folder(tmp_path_factory):
     motions, history = twin.compress(foam, options)
     for state, motion in enumerate(motions):
         volume = np.float32(twin.image(foam, motion, options, state))
-        save_volume(root / f"volumes/volume{state}.h5", volume, 20.0)
-        save_volume(root / f"volumes/smooth{state}.h5", volume, 20.0)
+        save_volume(root / f"volumes/volume{state}.h5", volume)
+        save_volume(root / f"volumes/smooth{state}.h5", volume)
         twin.write_network(root / f"network_state{state}.vtu", foam, motion, options)
     twin.write_history(root / "history.csv", history)
     body = foam.body
@@ -46,6 +46,7 @@ def case(folder):
         "labels": LABELS,
         "meso": ["meso33", "meso12"],
         "micro": ["micro"],
+        "voxel_um": 20.0,
     }
     return Case.of(description)
 
@@ -166,7 +167,15 @@ def test_the_table_of_checks_says_which_do_not_hold(tmp_path):
     }
     checks = [check, check | {"high": 1000.0, "value": 2000.0, "passed": False}]
     write_json(tmp_path / "analysis/twin_check.json", {"checks": checks})
-    case = Case.of({"root": tmp_path, "labels": LABELS, "meso": ["meso33"], "micro": ["micro"]})
+    case = Case.of(
+        {
+            "root": tmp_path,
+            "labels": LABELS,
+            "meso": ["meso33"],
+            "micro": ["micro"],
+            "voxel_um": 20.0,
+        }
+    )
     judging.twin_check(case, [tmp_path / "table.csv"])
     head, good, bad = rows_of(tmp_path / "table.csv")
     assert head == ["Check", "Value", "Unit", "At least", "At most", "Holds"]
@@ -179,7 +188,15 @@ def test_the_table_of_difficulty_has_a_column_a_state_and_units(tmp_path, turnin
     more = {"rotation": {"median": 2.0, "p95": 6.0}} if turning else {}
     states = [STATE | more | {"state": n} for n in LABELS]
     write_json(tmp_path / "analysis/difficulty.json", {"states": states})
-    case = Case.of({"root": tmp_path, "labels": LABELS, "meso": ["meso33"], "micro": ["micro"]})
+    case = Case.of(
+        {
+            "root": tmp_path,
+            "labels": LABELS,
+            "meso": ["meso33"],
+            "micro": ["micro"],
+            "voxel_um": 20.0,
+        }
+    )
     judging.difficulty(case, [tmp_path / "table.csv"])
     head, *rows = rows_of(tmp_path / "table.csv")
     assert head == ["Quantity", "Unit", "1.0 %", "2.0 %"]

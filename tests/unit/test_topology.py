@@ -159,7 +159,9 @@ def test_all_of_it_as_a_table_and_a_picture(frame, tmp_path):
     found = topology(mesh, cut, graph, struts, [], bridges)
     assert found["counts"] == {"stubs": 1, "necks": 0, "contacts": 0, "welds": 0, "bridges": 1}
     write_json(tmp_path / "geometry/topology.json", found)
-    case = Case.of({"root": tmp_path, "labels": {}, "meso": ["meso9"], "micro": ["micro"]})
+    case = Case.of(
+        {"root": tmp_path, "labels": {}, "meso": ["meso9"], "micro": ["micro"], "voxel_um": 20.0}
+    )
     write_table(tmp_path / "t.csv", pictures.topology_rows(case))
     rows = list(csv.reader((tmp_path / "t.csv").open()))
     assert [row[0] for row in rows] == ["Kind", "stub", "bridge"]

@@ -1,6 +1,13 @@
 # What figures read and how they enter the report; the rules are in figures.smk.
 
-FIGURE_CASE = {"root": R, "labels": LABELS, "meso": MESO, "micro": MICRO}
+FIGURE_CASE = {
+    "root": R,
+    "labels": LABELS,
+    "meso": MESO,
+    "micro": MICRO,
+    "voxel_um": settings.voxel_size_um(config)
+    * settings.scan_settings(config, 0)["bin"],
+}
 FIGURES = []
 ENTRIES = []  # of the page of captions, in the order of the rules
 CHAPTERS = {  # the order of the paper, then what is beyond it; snakemake sorts them

@@ -23,6 +23,7 @@ rule check_input:
     params:
         code=code("scans/check_input.py"),
         settings=settings.scan_settings(config, 0),
+        voxel_size_um=settings.voxel_size_um(config),
         scans=[scan_path(state) for state in GIVEN],
     script:
         "../scripts/scans/check_input.py"

@@ -11,7 +11,7 @@ from addvc.images.scans import load_volume, save_volume
 from addvc.images.specimen import Specimen
 
 with job(snakemake):
-    smooth, notes = load_volume(snakemake.input.smooth)
+    smooth, _ = load_volume(snakemake.input.smooth)
     specimen = Specimen.from_dict(read_json(snakemake.input.specimen))
     region = micro_region(specimen, snakemake.params.micro["region"])
     levels = read_json(snakemake.input.threshold)
@@ -20,6 +20,6 @@ with job(snakemake):
         reference, _ = load_volume(snakemake.input.reference)
         smooth, bridges = bridged(smooth, reference, levels, region, mesh["size"])
     grey, figures = region_solid(smooth, levels, region, mesh["min_kept"])
-    save_volume(snakemake.output.solid, grey, notes["voxel_size_um"], figures)
+    save_volume(snakemake.output.solid, grey, figures)
     write_json(snakemake.output.region, asdict(region))
     write_json(snakemake.output.bridges, bridges)

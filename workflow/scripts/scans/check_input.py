@@ -7,7 +7,7 @@ from addvc.images.scans_check import check_scans
 
 with job(snakemake):
     settings = snakemake.params.settings
-    factor, size = settings["bin"], settings["voxel_size_um"]
+    factor, size = settings["bin"], snakemake.params.voxel_size_um
     form = ScanFormat(**settings["format"])
     rows = check_scans(snakemake.params.scans, form, factor, settings["crop"])
     notes = {"voxel_size_um": size, "bin": factor, "binned_voxel_size_um": size * factor}

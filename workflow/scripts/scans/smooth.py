@@ -14,6 +14,5 @@ with job(snakemake):
     save_volume(
         snakemake.output[0],
         gaussian_blur(volume, images["blur"]),
-        notes["voxel_size_um"],
         {"bin": notes["bin"], "blur": images["blur"], "degree": images["degree"]},
     )

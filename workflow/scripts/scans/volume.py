@@ -9,4 +9,4 @@ with job(snakemake) as log:
     factor = settings["bin"]
     volume = read_binned(scan, factor, settings["crop"], progress(log, "slabs read"))
     log.info("%s: %s voxels %s, binned %s", scan.path, scan.dtype, scan.shape, volume.shape)
-    save_volume(snakemake.output[0], volume, settings["voxel_size_um"] * factor, {"bin": factor})
+    save_volume(snakemake.output[0], volume, {"bin": factor})

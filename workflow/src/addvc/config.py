@@ -125,29 +125,28 @@ def micro_names(config: dict) -> dict[str, str]:
 
 
 def scan_settings(config: dict, state: int) -> dict:
-    """How to read the scan of a state: `format` (of ScanFormat), `bin`, `crop`, `voxel_size_um`.
+    """How to read the scan of a state: `format` (of ScanFormat), `bin`, `crop`.
 
     Scans made by the workflow itself (twin, virtual states) are TIFF pages in z, y, x order."""
     kind = case_kind(config)
     if kind == "twin":
-        factor = config["twin"]["bin"]
-        return {
-            "format": {"axes": "zyx"},
-            "bin": factor,
-            "crop": None,
-            "voxel_size_um": TWIN_VOXEL_UM / factor,
-        }
+        return {"format": {"axes": "zyx"}, "bin": config["twin"]["bin"], "crop": None}
     scans = config["scans"]
-    size = scans["voxel_size_um"]
     if kind == "virtual" and state > 0:
-        return {"format": {"axes": "zyx"}, "bin": scans["bin"], "crop": None, "voxel_size_um": size}
+        return {"format": {"axes": "zyx"}, "bin": scans["bin"], "crop": None}
     keys = ("axes", "shape", "dtype", "byte_order", "header_bytes", "dataset")
     return {
         "format": {key: scans[key] for key in keys if key in scans},
         "bin": scans["bin"],
         "crop": scans["crop"],
-        "voxel_size_um": size,
     }
+
+
+def voxel_size_um(config: dict) -> float:
+    """Edge of a voxel of the scans, before binning, micrometres: for units only."""
+    if case_kind(config) == "twin":
+        return TWIN_VOXEL_UM / config["twin"]["bin"]
+    return config["scans"]["voxel_size_um"]
 
 
 def scan_paths(config: dict) -> list[str]:

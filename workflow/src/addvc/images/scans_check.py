@@ -5,7 +5,7 @@ import os
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from addvc.config import scan_files, scan_paths, scan_settings
+from addvc.config import scan_files, scan_paths, scan_settings, voxel_size_um
 from addvc.errors import ConfigError, ScanError
 from addvc.images.scans import Crop, Scan, ScanFormat, binned_shape, open_scan
 
@@ -59,7 +59,7 @@ def check_headers(config: dict) -> str:
     refuse(problems + wrong)
     region = config.get("micro", {}).get("region", "all")
     check_slab(region, found[0].binned["xyz".index(config["loading_axis"])])
-    return described(found[0], len(found), known["voxel_size_um"], known["bin"])
+    return described(found[0], len(found), voxel_size_um(config), known["bin"])
 
 
 def check_slab(region: str | dict, length: int) -> None:

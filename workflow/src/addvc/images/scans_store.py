@@ -9,16 +9,13 @@ from numpy.typing import NDArray
 from addvc.images.files import atomic_path
 
 
-def save_volume(
-    path: str | os.PathLike, volume: NDArray, voxel_size_um: float, attrs: dict | None = None
-) -> None:
+def save_volume(path: str | os.PathLike, volume: NDArray, attrs: dict | None = None) -> None:
     """Write (nx, ny, nz) as float32 dataset 'volume' of an HDF5 file, whole or not at all.
 
-    voxel_size_um: edge of a voxel of this volume. attrs: more attributes (numbers, strings, lists
-    of them), such as bin; axes, voxel_size_um and unit (of voxel_size_um) are set here.
+    attrs: more attributes (numbers, strings, lists of them), such as bin; axes is set here. The size of
+    a voxel is not among them: nothing but figures and tables depends on it, and it is in input.json.
     """
-    given = {"bin": 1, **(attrs or {})}
-    given |= {"axes": "xyz", "voxel_size_um": float(voxel_size_um), "unit": "um"}
+    given = {"bin": 1, **(attrs or {}), "axes": "xyz"}
     chunks = tuple(min(64, n) for n in volume.shape)
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         data = np.asarray(volume, dtype=np.float32)

@@ -38,14 +38,14 @@ def states(case: Case, outputs: Iterable[str]) -> None:
     for panel, (ax, state, foam) in enumerate(zip(axes[0], numbers, foams, strict=True)):
         render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state] if state else "reference", panel)
-    style.scale_bar(axes[0, 0], case.voxel_um(), 0.5)
+    style.scale_bar(axes[0, 0], case.voxel_um, 0.5)
     style.axis_arrows(axes[0, -1], view.right, view.up)
     style.save(fig, outputs)
 
 
 def _foam(case: Case, state: int) -> tuple[np.ndarray, np.ndarray]:
     """Surface of the foam of a state, between its own platens where they are seen."""
-    volume, _ = case.image(state)
+    volume = case.image(state)
     specimen = case.specimen
     low, high = specimen.low, specimen.high
     if state:
@@ -81,7 +81,7 @@ def _opened(mesh: Mesh, view: View, axis: int) -> Layer:
 
 def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
     """Fig. 7: surface of a crop of 50 voxels a side without blur, with Eq. 8, and with 2 voxels."""
-    crop, voxel_um = _crop(case)
+    crop = _crop(case)
     share = float(np.mean(gaussian_blur(crop, sigma) > case.gamma))
     widths = {
         "no blur": 0.0,
@@ -96,20 +96,20 @@ def blur(case: Case, outputs: Iterable[str], sigma: float) -> None:
         body = segmented(grey, gamma, np.zeros(3), np.array(crop.shape))
         render([Layer(*body)], view, 56, cube, True).show(ax)
         style.headline(ax, title, panel)
-    style.scale_bar(axes[0, 0], voxel_um)
+    style.scale_bar(axes[0, 0], case.voxel_um)
     style.axis_arrows(axes[0, -1], view.right, view.up)
     style.save(fig, outputs)
 
 
-def _crop(case: Case) -> tuple[np.ndarray, float]:
-    """50 voxels a side in the middle of the specimen, not blurred, and the voxel size."""
-    volume, voxel_um = case.image(0, smooth=False)
+def _crop(case: Case) -> np.ndarray:
+    """50 voxels a side in the middle of the specimen, not blurred."""
+    volume = case.image(0, smooth=False)
     specimen = case.specimen
     middle = np.empty(3)
     middle[specimen.axis] = (specimen.low + specimen.high) / 2
     middle[list(specimen.across)] = specimen.centre
     low = np.maximum(np.round(middle).astype(int) - 25, 0)
-    return volume[tuple(slice(a, a + 50) for a in low)], voxel_um
+    return volume[tuple(slice(a, a + 50) for a in low)]
 
 
 def region(case: Case, outputs: Iterable[str]) -> None:
@@ -135,7 +135,7 @@ def _side_by_side(
     for panel, (ax, (title, picture)) in enumerate(zip(axes[0], pictures.items(), strict=True)):
         picture.show(ax)
         style.headline(ax, title, panel)
-        style.scale_bar(ax, case.voxel_um())
+        style.scale_bar(ax, case.voxel_um)
         style.axis_arrows(ax, views[panel].right, views[panel].up)
     fig.supxlabel(text, fontsize=8.5)
     style.save(fig, outputs)
@@ -144,7 +144,7 @@ def _side_by_side(
 def _outside(case: Case) -> Layer:
     """The foam that is not in the region of micro DVC."""
     specimen, limits = case.specimen, Region(**case.json("geometry/region.json"))
-    points, faces = whole_foam(case.image(0)[0], case.gamma, specimen, specimen.low, specimen.high)
+    points, faces = whole_foam(case.image(0), case.gamma, specimen, specimen.low, specimen.high)
     depth = np.minimum(*caps_depth(limits, points[faces].mean(axis=1)))
     return Layer(points, faces[depth < 0])
 
@@ -177,7 +177,7 @@ def penalised(case: Case, outputs: Iterable[str]) -> None:
     for panel, (ax, (name, view)) in enumerate(zip(axes[0], views.items(), strict=True)):
         render([Layer(mesh.points, faces, on_faces)], view, 80, shadows=True).show(ax)
         style.headline(ax, name, panel)
-        style.scale_bar(ax, case.voxel_um())
+        style.scale_bar(ax, case.voxel_um)
         style.axis_arrows(ax, view.right, view.up)
     names = ("equilibrium gap", "curvature, ends", "curvature, sides")
     handles = [
@@ -209,7 +209,7 @@ def local_region(case: Case, outputs: Iterable[str]) -> None:
 def _around(case: Case, box: tuple, normal: int) -> tuple[Layer, Layer]:
     """The foam without what is in a box: behind it and beside it, and, hardly to be seen, before it."""
     specimen = case.specimen
-    points, faces = whole_foam(case.image(0)[0], case.gamma, specimen, specimen.low, specimen.high)
+    points, faces = whole_foam(case.image(0), case.gamma, specimen, specimen.low, specimen.high)
     middle = points[faces].mean(axis=1)
     before = middle[:, normal] > box[1][normal]
     rest = ~before & ~in_box(middle, *box)

@@ -24,17 +24,19 @@ class UndeclaredInput(RuntimeError):
 @dataclass(frozen=True)
 class Case:
     """Folder of results, states with their labels, names of the meso meshes (coarse to fine) and of
-    the micro results; `inputs`: the only files that may be read (None for any)."""
+    the micro results, edge of a voxel of the binned images in µm; `inputs`: the only files that may be
+    read (None for any)."""
 
     root: Path
     labels: dict[int, str]
     meso: tuple[str, ...]
     micro: tuple[str, ...]
+    voxel_um: float
     inputs: frozenset[Path] | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, description: dict, inputs: Iterable[str] | None = None) -> "Case":
-        """From {root, labels, meso, micro}, and the input files of the job."""
+        """From {root, labels, meso, micro, voxel_um}, and the input files of the job."""
         allowed = None if inputs is None else frozenset(Path(name) for name in inputs)
         labels = {int(n): label for n, label in description["labels"].items()}
         return cls(
@@ -42,6 +44,7 @@ class Case:
             labels,
             tuple(description["meso"]),
             tuple(description["micro"]),
+            float(description["voxel_um"]),
             allowed,
         )
 
@@ -81,15 +84,9 @@ class Case:
         """Voxels."""
         return float(self.json("geometry/cell_size.json")["cell_size"])
 
-    def image(self, state: int, smooth: bool = True) -> tuple[np.ndarray, float]:
-        """Volume (nx, ny, nz) of a state, 0 for the reference, and its voxel size in µm."""
-        volume, attrs = load_volume(self.path(image_name(state, smooth)))
-        return volume, float(attrs["voxel_size_um"])
-
-    def voxel_um(self) -> float:
-        """Voxel size of the binned images, without reading one."""
-        with h5py.File(self.path(image_name(0))) as file:
-            return float(file["volume"].attrs["voxel_size_um"])
+    def image(self, state: int, smooth: bool = True) -> np.ndarray:
+        """Volume (nx, ny, nz) of a state, 0 for the reference."""
+        return load_volume(self.path(image_name(state, smooth)))[0]
 
     def mesh(self, name: str) -> Mesh:
         return read_mesh(self.path(f"geometry/{name.split('-')[0]}.vtu"))

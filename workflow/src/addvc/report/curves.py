@@ -15,11 +15,11 @@ def cell_size(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 4: (a) radial autocorrelation with its secondary peak, (b) a slice of the reference."""
     fig = style.figure(72)
     left, right = fig.subplots(1, 2, width_ratios=(1.1, 1))
-    volume, voxel_um = case.image(0, smooth=False)
-    _autocorrelation(left, case.json("geometry/cell_size.json"), voxel_um)
+    volume = case.image(0, smooth=False)
+    _autocorrelation(left, case.json("geometry/cell_size.json"), case.voxel_um)
     style.headline(left, "autocorrelation of the reference", 0)
     slice_across(right, volume, case.specimen)
-    style.scale_bar(right, voxel_um)
+    style.scale_bar(right, case.voxel_um)
     style.headline(right, "slice across the loading axis", 1)
     style.save(fig, outputs)
 
@@ -168,7 +168,7 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
         risk = (risk - risk.min()) / (risk.min() or 1.0)
         ax.plot(tried, 100 * risk, "o-", color=colour, ms=4, label=case.title(state, case.micro[0]))
         ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
-    ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um())})")
+    ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um)})")
     ax.set_ylabel("risk above its least (%)")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter("{x:g}")
@@ -218,7 +218,7 @@ def _error_panels(case: Case, names: Sequence[str]) -> tuple:
         ax.yaxis.set_major_formatter("{x:g}")
         ax.yaxis.set_minor_formatter(NullFormatter())
         ax.grid(axis="y", which="both", lw=0.3, color="#dddddd")
-    axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um())})")
+    axes[0].set_ylabel(f"error ({style.voxels(case.voxel_um)})")
     return fig, axes
 
 

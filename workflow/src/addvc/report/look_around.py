@@ -84,7 +84,7 @@ def scene_data(case: Case) -> dict:
         "axis": style.AXES[axis],
         "eye": (2.2 * oblique(axis).towards).tolist(),
         "up": np.eye(3)[axis].tolist(),
-        "voxel_um": case.voxel_um(),
+        "voxel_um": case.voxel_um,
         "points": [packed(component) for component in points.T],
         "faces": encoded(faces.astype("<u4")),
         "states": states,

@@ -32,7 +32,7 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
         style.headline(axes.flat[panel], title, panel)
     for ax, name in zip(axes[:, 0], names, strict=True):
         style.row_name(ax, name)
-    style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4)
+    style.scale_bar(axes[-1, 0], case.voxel_um, 0.4)
     style.axis_arrows(axes[-1, -1], view.right, view.up)
     label = "residual r (grey levels)"
     style.colour_bar(fig, axes, norm, style.SIGNED, label, shrink=0.7, aspect=30)
@@ -57,7 +57,7 @@ def fields(case: Case, outputs: Iterable[str]) -> None:
     meso mesh, right micro DVC."""
     names, state = (case.finest, case.micro[0]), case.shown_state()
     slices = [_slice(case, name, state) for name in names]
-    labels = [f"$u_{x}$ ({style.voxels(case.voxel_um())})" for x in style.AXES]
+    labels = [f"$u_{x}$ ({style.voxels(case.voxel_um)})" for x in style.AXES]
     labels.append(r"strain $\|\varepsilon\|_F$ (–)")
     view = facing(case.specimen.axis, slab(case.mesh("micro"), case.specimen.axis, 1)[0])
     fig, axes = style.panels(4, 2, aspect(view, slices[0].points), 11, 18, below=8)
@@ -69,7 +69,7 @@ def fields(case: Case, outputs: Iterable[str]) -> None:
             text = f"{name}, {case.title(state, name)}"
             style.headline(axes[d, column], text, 2 * d + column)
         style.colour_bar(fig, axes[d], norm, cmap, label, aspect=16, shrink=0.9, pad=0.02)
-    style.scale_bar(axes[-1, 0], case.voxel_um())
+    style.scale_bar(axes[-1, 0], case.voxel_um)
     style.axis_arrows(axes[-1, 1], view.right, view.up)
     if any(part.doubtful.any() for part in slices):
         doubt = [Patch(color=style.DOUBT, label="in doubt: residual far above the noise")]

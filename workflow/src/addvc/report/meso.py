@@ -30,7 +30,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             sigma = f"σ(r) = {solution.residual['std']:.2f} grey levels"
             style.note(ax, sigma + _inverted(mesh, solution.u), fontsize=8)
         style.row_name(axes[row, 0], name)
-    style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.2)
+    style.scale_bar(axes[-1, 0], case.voxel_um, 0.4, y=-0.2)
     style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.28)
     style.save(fig, outputs)
 
@@ -67,9 +67,9 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
             style.headline(ax, case.title(state, name), d * columns + column)
             text = f"{style.signed(values.min())} to {style.signed(values.max())}"
             style.note(ax, text, fontsize=8)
-        label = f"$u_{style.AXES[d]}$ ({style.voxels(case.voxel_um())})"
+        label = f"$u_{style.AXES[d]}$ ({style.voxels(case.voxel_um)})"
         style.colour_bar(fig, axes[d], norm, cmap, label, shrink=0.85, aspect=18, pad=0.01)
-    style.scale_bar(axes[-1, 0], case.voxel_um(), 0.4, y=-0.17)
+    style.scale_bar(axes[-1, 0], case.voxel_um, 0.4, y=-0.17)
     style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.17)
     style.save(fig, outputs)
 

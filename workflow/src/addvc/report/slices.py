@@ -35,7 +35,7 @@ def slice_across(ax: Axes, volume: np.ndarray, specimen: Specimen) -> None:
 
 def platen_grid(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 6: (a) the hexahedral grid over a slice that holds both platens, (b) in space."""
-    volume, voxel_um = case.image(0)
+    volume = case.image(0)
     specimen, grid = case.specimen, case.mesh("grid")
     points, faces = whole_foam(volume, case.gamma, specimen, specimen.low, specimen.high)
     edges = _edges(boundary(grid)[0])
@@ -46,7 +46,7 @@ def platen_grid(case: Case, outputs: Iterable[str]) -> None:
     left, right = axes[0]
     picture.show(right)
     _grid_over_slice(left, volume, specimen, grid.points)
-    style.scale_bar(left, voxel_um)
+    style.scale_bar(left, case.voxel_um)
     style.headline(left, "grid over the middle slice", 0)
     cells = f"{len(grid.cells)} hexahedra, {len(grid.points)} nodes"
     style.headline(right, cells, 1)

@@ -55,7 +55,7 @@ def network(case: Case, outputs: Iterable[str]) -> None:
         label = "share of bending (–)" if row == 0 else "axial strain (–)"
         ends = "neither" if row == 0 else "both"
         style.colour_bar(fig, ax, norm, cmap, label, shrink=0.7, extend=ends)
-    style.scale_bar(axes[1, 0], case.voxel_um(), 0.4)
+    style.scale_bar(axes[1, 0], case.voxel_um, 0.4)
     style.axis_arrows(axes[1, 1], view.right, view.up)
     handles = [
         Patch(color=style.DOUBT, label="in doubt"),

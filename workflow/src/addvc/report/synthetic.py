@@ -23,10 +23,10 @@ def scans(case: Case, outputs: Iterable[str]) -> None:
     numbers, specimen = [0, *case.states], case.specimen
     normal = specimen.across[1]
     images = [case.image(n, smooth=False) for n in numbers]
-    pictures = [_upright(v, specimen.axis, normal) for v, _ in images]
+    pictures = [_upright(v, specimen.axis, normal) for v in images]
     nx, ny = pictures[0][0].shape
     fig, axes = style.panels(2, len(numbers), ny / nx, spare=7, bar=14)
-    limits = tuple(np.percentile(images[0][0], (0.5, 99.9)))
+    limits = tuple(np.percentile(images[0], (0.5, 99.9)))
     for column, (state, pair) in enumerate(zip(numbers, pictures, strict=True)):
         for ax, plane in zip(axes[:, column], pair, strict=True):
             show_slice(ax, plane, limits)
@@ -34,7 +34,7 @@ def scans(case: Case, outputs: Iterable[str]) -> None:
         style.headline(axes[0, column], case.labels[state] if state else "reference", column)
     style.row_name(axes[0, 0], "slice")
     style.row_name(axes[1, 0], "maximum projection")
-    style.scale_bar(axes[1, 0], images[0][1], 0.5)
+    style.scale_bar(axes[1, 0], case.voxel_um, 0.5)
     style.colour_bar(fig, axes, Normalize(*limits), "gray", "grey level", shrink=0.6)
     style.save(fig, outputs)
 
@@ -67,7 +67,7 @@ def network(case: Case, outputs: Iterable[str], files: list[str]) -> None:
         ax = axes.flat[panel]
         render([layer], view, style.WIDTH / columns, fit, shadows=True).show(ax)
         style.headline(ax, case.labels[state], panel)
-    style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
+    style.scale_bar(axes[0, 0], case.voxel_um, 0.4)
     style.axis_arrows(axes[0, -1], view.right, view.up)
     label = "bending energy per length of the strut, over its mean (–)"
     style.colour_bar(fig, axes, norm, "plasma", label, shrink=0.6)

@@ -53,7 +53,7 @@ def marked(case: Case, outputs: Iterable[str]) -> None:
         picture.show(ax)
         style.headline(ax, "from one side" if number == 0 else "from a quarter turn on", number)
         style.axis_arrows(ax, views[number].right, views[number].up)
-    style.scale_bar(axes[0, 0], case.voxel_um(), 0.4)
+    style.scale_bar(axes[0, 0], case.voxel_um, 0.4)
     handles = [
         style.line(colour, f"{name}: {len(where[kind])}", "", "o")
         for kind, (name, colour) in KINDS.items()

@@ -46,9 +46,9 @@ def _map(fig, case: Case, nodes: np.ndarray, title: str) -> None:
     ax = fig.subplots()
     render([layer], view, 85).show(ax)
     style.headline(ax, f"standard uncertainty, {title}", 0)
-    style.scale_bar(ax, case.voxel_um(), 0.4)
+    style.scale_bar(ax, case.voxel_um, 0.4)
     style.axis_arrows(ax, view.right, view.up)
-    label = f"from noise ({style.voxels(case.voxel_um())})"
+    label = f"from noise ({style.voxels(case.voxel_um)})"
     place = {"location": "top", "shrink": 0.8, "aspect": 30}
     style.colour_bar(fig, ax, norm, style.MAGNITUDE, label, **place)
 

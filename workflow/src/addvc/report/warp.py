@@ -24,7 +24,7 @@ def warped(case: Case, outputs: Iterable[str]) -> None:
     before = slab_box(mesh, axis, case.cell_size)
     after = _carried_box(mesh, u[case.micro[0]], before, axis)
     images = (0, before), (state, after)
-    surfaces = [segmented(case.image(n)[0], case.gamma, *box) for n, box in images]
+    surfaces = [segmented(case.image(n), case.gamma, *box) for n, box in images]
     titles = "segmented $I_r$", f"segmented $I_d$, {case.labels[state]}"
     bodies = dict(zip(titles, surfaces, strict=True))
     for name in u:
@@ -32,7 +32,7 @@ def warped(case: Case, outputs: Iterable[str]) -> None:
         bodies[title] = _cut(mesh, u[name], *after)
     found = case.json(f"analysis/warp_state{state}.json")
     words = [f"line: outline of (b)\n{_words(found[name])}" for name in u]
-    _draw_warped(bodies, words, facing(axis, slab(mesh, axis, 1)[0]), case.voxel_um(), outputs)
+    _draw_warped(bodies, words, facing(axis, slab(mesh, axis, 1)[0]), case.voxel_um, outputs)
 
 
 def _draw_warped(bodies: dict, words: list, view: View, voxel_um: float, outputs) -> None:
@@ -103,7 +103,7 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
     meso, micro = (case.displacement(name, state) for name in (case.finest, case.micro[0]))
     half = 0.45 * case.cell_size
     places = _places(case, mesh, np.linalg.norm(micro - meso, axis=1), half)
-    deformed, gamma = case.image(state)[0], case.gamma
+    deformed, gamma = case.image(state), case.gamma
     titles = [r"$\Omega_r$", *(_zoom_title(case, n, state) for n in (case.finest, case.micro[0]))]
     fig, axes = style.panels(len(places), 3, 1.0, below=6)
     for row, node in enumerate(places):
@@ -118,7 +118,7 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
             fit = centre + half * np.vstack([view.right + view.up, -view.right - view.up])
             render(layers, view, 55, fit).show(axes[row, column])
             style.headline(axes[row, column], titles[column], 3 * row + column)
-        style.scale_bar(axes[row, 0], case.voxel_um())
+        style.scale_bar(axes[row, 0], case.voxel_um)
     colours = {r"$\Omega_d$: segmented $I_d$": style.SOLID, r"$\Omega_r + u$: carried": style.RED}
     handles = [Patch(color=colour, label=label) for label, colour in colours.items()]
     fig.legend(handles=handles, loc="outside lower center", ncols=2)
