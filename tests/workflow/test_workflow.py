@@ -374,6 +374,24 @@ def test_a_porosity_that_no_threshold_gives(place, results):
     assert not (place / "results/solid/geometry/micro.vtu").exists()
 
 
+def test_another_voxel_size_remakes_no_volume_and_hides_no_other_change(place):
+    """A check of the scans that is done again must not keep what comes after it from being seen."""
+    volume = np.random.default_rng(2417).integers(0, 255, (24, 24, 24), dtype=np.uint8)
+    save(place, "rest.npy", volume)
+    save(place, "load.npy", volume[::-1])
+    scans = {"reference": "scans/rest.npy", "states": ["scans/load.npy"]}
+    targets = [f"results/size/{name}" for name in ("volumes/smooth0.h5", "input.json")]
+    config = bad_case(place, "size", scans=scans)
+    done = snakemake(place, *targets, config=config)
+    assert done.returncode == 0, done.stdout[-4000:]
+
+    config = bad_case(place, "size", scans=scans | {"voxel_size_um": 18.0})
+    assert started(snakemake(place, "--dry-run", *targets, config=config).stdout) == {"check_input"}
+    config = bad_case(place, "size", scans=scans | {"voxel_size_um": 18.0}, images={"blur": 1.0})
+    plan = started(snakemake(place, "--dry-run", *targets, config=config).stdout)
+    assert plan == {"check_input", "smooth"}
+
+
 # ----------------------------------------------------------------------------------- kills
 
 
