@@ -267,7 +267,18 @@ def test_lock_of_a_killed_run_is_cleared_but_not_that_of_a_live_one(ready):
         result, calls = ready("run", "-c1")
         live.terminate()
     assert f"snakemake is at work in this folder (process {live.pid})" in result.stderr
-    assert calls[0] == "snakemake --rerun-incomplete --logger=addvc -c1"
+    assert result.returncode == 1 and not calls
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs /proc")
+def test_a_second_run_is_refused_even_where_the_lock_is_gone(ready):
+    words = [sys.executable, "-c", "import time; time.sleep(60)", "-m", "snakemake", "--cores"]
+    with subprocess.Popen(words, cwd=ready.folder) as live:
+        refused, calls = ready("run", "-c1")
+        looked, _ = ready("run", "-c1", "-n")
+        live.terminate()
+    assert refused.returncode == 1 and "another clone can run beside it" in refused.stderr
+    assert not calls and "at work" not in looked.stderr
 
 
 def test_lock_held_from_another_machine_is_left_alone(ready):

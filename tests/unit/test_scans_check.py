@@ -77,7 +77,7 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path, pages):
     with pytest.raises(ScanError) as told:
         check_headers(config(good, missing, empty, half, size, kind))
     first, *lines = str(told.value).split("\n- ")
-    assert first == "5 things are wrong with the scans, none may be:"
+    assert first == "5 things are wrong with the scans:"
     for path in (missing, empty, half, size, kind):
         assert (
             sum(line.startswith((f"scan {path} ", f"{path}: ", f"{path} ")) for line in lines) == 1

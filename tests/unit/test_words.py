@@ -245,7 +245,8 @@ def test_the_front_page_tells_of_a_band():
             "factor": 1.5, "band_strain_share": 0.225, "band_volume_share": 0.131}  # fmt: skip
     told = front_page(summary(GOOD | {"cells": band}), CONFIG, SCANS)
     assert (
-        "over 1.5 times the mean: 13% of the volume, with 22% of the compression, 25 voxels" in told
+        "over 1.5 times the mean strain: 13% of the volume, with 22% of the compression, 25 voxels"
+        in told
     )
     assert "24 degrees" in told
     lump = front_page(summary(GOOD | {"cells": band | {"flatness": 0.9}}), CONFIG, SCANS)

@@ -11,6 +11,7 @@ rule fig03:
         f"{R}/logs/figures/fig03.log",
     benchmark:
         f"{R}/benchmarks/figures/fig03.tsv"
+    priority: 10  # the one that shows a wrong shape, axis or threshold
     conda:
         ENV
     threads: 1

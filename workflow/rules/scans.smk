@@ -39,6 +39,7 @@ rule input_hashes:
         f"{R}/logs/input_hashes/all.log",
     benchmark:
         f"{R}/benchmarks/input_hashes/all.tsv"
+    priority: 10  # it tells copies apart
     conda:
         ENV
     threads: 1

@@ -108,7 +108,7 @@ def refuse(problems: Sequence[str]) -> None:
         raise ScanError(different[0])
     if different:
         lines = "".join(f"\n- {problem}" for problem in different)
-        raise ScanError(f"{len(different)} things are wrong with the scans, none may be:{lines}")
+        raise ScanError(f"{len(different)} things are wrong with the scans:{lines}")
 
 
 def _check_like(scan: Scan, first: Scan) -> None:

@@ -209,8 +209,9 @@ def band_words(cells: dict | None) -> str:
         else "a lump rather than a plate"
     )
     return (
-        f" Compressed by over {cells['factor']:g} times the mean: {cells['band_volume_share']:.0%} of "
-        f"the volume, with {cells['band_strain_share']:.0%} of the compression, {shape}."
+        f" Largest band of over {cells['factor']:g} times the mean strain: "
+        f"{cells['band_volume_share']:.0%} of the volume, with {cells['band_strain_share']:.0%} of the "
+        f"compression, {shape}."
     )
 
 
