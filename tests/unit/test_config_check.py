@@ -10,6 +10,13 @@ from addvc.errors import ConfigError
 SCHEMA = yaml.safe_load(reference.SCHEMA.read_text())
 
 
+@pytest.fixture(autouse=True)
+def scans_are_there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.tif", "b.tif"):
+        (tmp_path / name).touch()
+
+
 def own(**changes):
     """A configuration of the user's own scans that nothing is wrong with, but for the changes."""
     scans = {"reference": "a.tif", "states": ["b.tif"], "voxel_size_um": 20}
@@ -53,25 +60,36 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
             r"`porosity` is 0.04; at least 0.3 .* not of solid \(did you mean 0.96\?",
         ),
         ({"porosity": None}, "`porosity` is missing: give"),
+        ({"porosity": "0,96"}, r"must be a number \(write 0.96, with a dot and without quotes\)\."),
+        ({"porosity": "96 %"}, r"must be a number \(did you mean 0.96\?\)\. Share"),
         ({"porosity": "a lot"}, r"`porosity` is 'a lot'; it must be a number\. Share of void"),
         ({"case": "my case"}, "`case` is 'my case'; only letters, digits"),
-        ({"case": None}, "`case` is twin, .*case: mine"),
+        ({"case": None}, "`case` is missing: .*case: mine"),
+        ({"case": "twin"}, "`case` is twin, .*case: mine"),
         ({"loading_axis": "Y"}, r"one of x, y, z \(did you mean y\?\)\. Direction of compression"),
         (
             {"scans": {"reference": "a.tif"}},
             "`scans.voxel_size_um` is missing. Voxel size of the scan",
         ),
-        (scans(voxel_size_um=0.018), "is 0.018; it must be at least 0.05. .* 18, not 0.018"),
-        (scans(voxel_size_um=18e-6), "is 1.8e-05; it must be at least 0.05"),
+        (scans(voxel_size_um=0.018), r"at least 0.05 \(0.018 millimetres\? that is 18\)\. Voxel"),
+        (scans(voxel_size_um=18e-6), r"at least 0.05 \(1.8e-05 metres\? that is 18\)"),
+        (scans(voxel_size_um=18000), r"at most 1000 \(18000 nanometres\? that is 18\)"),
+        (scans(crop=[20, 100]), r"`scans.crop` is \[20, 100\]; it must be a list of at least 3\."),
+        (scans(platens=[130, 10]), r"scans.platens is \[130, 10\]; give \[LOW, HIGH\]"),
+        (scans(platens="both"), "it must be auto, none or a list"),
+        ({"geometry": {"cell_size": "1.2mm"}}, r"auto or a number \(write 1.2, without its unit\)"),
         (
             scans(crop=[[-5, 10], None, None]),
             r"`scans.crop.0.0` is -5; it must be at least 0\. \[\[x0",
         ),
-        (scans(states="b.tif"), r"`scans.states` is 'b.tif'; it must be a list\. Scans of"),
+        (
+            scans(states="b.tif"),
+            r"`scans.states` is 'b.tif'; it must be a list \(write \[b.tif\]\)\. Scans",
+        ),
         ({"micro": {"l_e": -3}}, r"`micro.l_e` is -3; it must be above 0\. Cut-off length l_E"),
         (
             {"micro": {"l_e": "automatic"}},
-            r"`micro.l_e` is 'automatic', which is not allowed\. Cut-off",
+            r"`micro.l_e` is 'automatic'; it must be auto or a number\. Cut-off",
         ),
         (
             {"micro": {"region": {"low": 80, "high": 40}}},
@@ -99,6 +117,20 @@ def test_all_that_is_wrong_is_told_at_once():
     assert str(told.value).count("\n- ") == 4
     with pytest.raises(ConfigError, match=r"^2 things are wrong:"):
         check_config(own(porosity=None, micro={"region": {"low": 80, "high": 40}}), SCHEMA)
+
+
+def test_scans_that_are_missing_are_told_with_the_other_faults():
+    with pytest.raises(
+        ConfigError, match=r"^2 things are wrong:[\s\S]*scan gone\.tif was not found"
+    ):
+        check_config(own(porosity=None, **scans(states=["gone.tif"])), SCHEMA)
+
+
+def test_a_misspelt_key_that_is_needed_is_told_once():
+    given = {"scans": {"reference": "a.tif", "states": ["b.tif"], "voxel_size": 20}}
+    with pytest.raises(ConfigError, match=r"^unknown key `scans.voxel_size`: did you mean") as told:
+        check_config(own(**given), SCHEMA)
+    assert "is missing" not in str(told.value)
 
 
 def test_every_missing_key_and_a_section_left_empty_are_told():

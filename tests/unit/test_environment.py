@@ -129,11 +129,18 @@ def test_help_names_the_commands_and_sets_nothing_up(copy):
     assert not (copy.folder / ".venv").exists()
 
 
-@pytest.mark.parametrize("words", [[], ["install"], ["--cores", "1"]])
-def test_unknown_command_gives_usage_and_status_2(copy, words):
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "Usage:"),
+        (["rum"], "addvc: rum: no such command; run, test or help?"),
+        (["--cores", "1"], "addvc: --cores: no such command"),
+    ],
+)
+def test_no_or_an_unknown_command_is_told_with_status_2(copy, words, said):
     result, _ = copy(*words)
     assert result.returncode == 2
-    assert result.stdout == "" and result.stderr.startswith("Usage:")
+    assert result.stdout == "" and result.stderr.startswith(said)
     assert not (copy.folder / ".venv").exists()
 
 
@@ -194,7 +201,7 @@ def test_missing_system_packages_are_asked_for_in_one_command(copy):
     "words, given",
     [
         ("", "--cores all"),
-        ("-n results/a", "--cores all -n results/a"),
+        ("-n results/a", "--cores all --nolock -n results/a"),
         ("--config cores=3", "--cores all --config cores=3"),
         ("--cores 2", "--cores 2"),
         ("-c2", "-c2"),
@@ -233,6 +240,27 @@ def test_missing_config_file_is_named(ready, tmp_path):
     result, calls = ready("run", "--configfile", "none.yaml", cwd=tmp_path)
     assert result.returncode == 1 and not calls
     assert "none.yaml: no such configuration" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--configfile", "--configfile: of which FILE?"),
+        ("--configfile -n", "--configfile: of which FILE?"),
+        ("-configfile my.yaml", "-configfile: did you mean --configfile?"),
+    ],
+)
+def test_a_configuration_that_is_not_named_is_asked_for(ready, words, said):
+    result, calls = ready("run", *words.split())
+    assert result.returncode == 1 and not calls
+    assert said in result.stderr
+
+
+def test_a_fault_of_the_default_configuration_is_told_too(ready):
+    (ready.folder / "config").mkdir(exist_ok=True)
+    (ready.folder / "config/config.yaml").touch()
+    _, calls = ready("run", "-c1")
+    assert any(call.startswith("python -m addvc.readable config/config.yaml") for call in calls)
 
 
 def test_a_configuration_in_the_place_of_a_target_is_told(ready, tmp_path):

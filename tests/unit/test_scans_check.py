@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from addvc.errors import ConfigError, ScanError
+from addvc.errors import ConfigError, GeometryError, ScanError
 from addvc.images.scans import ScanFormat
 from addvc.images.scans_check import check_headers, check_scans
 
@@ -83,7 +83,7 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path, pages):
             sum(line.startswith((f"scan {path} ", f"{path}: ", f"{path} ")) for line in lines) == 1
         )
     assert "was not found (0 files; at least 1)" in lines[0]
-    assert check_headers(config(good)).startswith("1 scans of 34 x 37 x 41 voxels")
+    assert check_headers(config(good)).startswith("1 scan of 34 x 37 x 41 voxels")
 
 
 def test_a_scan_that_is_listed_twice_is_refused(tmp_path, pages):
@@ -104,6 +104,22 @@ def test_a_problem_that_all_share_is_told_once(tmp_path, pages):
     given = config(tmp_path / "a.npy", tmp_path / "b.npy", crop=[[0, 99], None, None])
     with pytest.raises(ScanError, match=r"^crop of x is 0 to 99, but the scan has 34 voxels"):
         check_headers(given)
+
+
+def test_a_fault_of_all_raw_files_is_told_once(tmp_path):
+    for name in "ab":
+        (tmp_path / f"{name}.raw").write_bytes(bytes(1000))
+    given = config(tmp_path / "a.raw", tmp_path / "b.raw", shape=[20, 20, 20], dtype="uint8")
+    with pytest.raises(ScanError, match=r"a\.raw: expected 8000 .*\(so it is with 1 more scan\)$"):
+        check_headers(given)
+
+
+@pytest.mark.parametrize("platens", [[-5, 20], [3, 500], [20, 3]])
+def test_platens_outside_the_image_or_reversed_are_refused(tmp_path, pages, platens):
+    np.save(tmp_path / "a.npy", pages)
+    assert check_headers(config(tmp_path / "a.npy", platens=[3, 20]))
+    with pytest.raises(GeometryError, match=r"platens \[.*; give"):
+        check_headers(config(tmp_path / "a.npy", platens=platens))
 
 
 def test_slices_are_opened_at_both_ends_only(tmp_path, pages, monkeypatch):

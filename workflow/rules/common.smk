@@ -1,3 +1,4 @@
+import os
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ sys.path.insert(0, str(WORKFLOW / "src"))
 from addvc import config as settings
 from addvc import studies
 from addvc.config_check import check_config
-from addvc.errors import AddvcError
+from addvc.errors import AddvcError, error_in
 from addvc.provenance import code_hash
 
 SCHEMA = WORKFLOW / "schemas/config.schema.yaml"

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from jsonschema import Draft202012Validator, ValidationError
 
 from addvc import config as settings
+from addvc.config_hints import alternatives, is_text, limit_hint, list_hint, number_hint
 from addvc.errors import ConfigError
 
 KINDS = {
@@ -16,6 +17,9 @@ KINDS = {
     "array": "a list",
     "object": "a section of keys",
 }
+KIND_RULES = ("const", "enum", "type")
+"""Rules of the schema on what kind of value there may be, where several kinds may."""
+
 LIMITS = {
     "minimum": "at least {}",
     "maximum": "at most {}",
@@ -33,9 +37,10 @@ def check_config(config: dict, schema: dict) -> list[str]:
     """Warnings about a configuration as the user gave it, without defaults.
 
     Raises ConfigError with every unknown key and every value the schema does not allow; where there is
-    none, with every pair of values that do not go together."""
-    refuse(list(key_faults(config, schema)) + list(value_faults(config, schema)))
-    refuse(pair_faults(config))
+    none, with every pair of values that do not go together; and with the scans that are not there."""
+    faults = [*key_faults(config, schema), *value_faults(config, schema)] or pair_faults(config)
+    if faults:
+        refuse([*faults, *missing_scans(config)])
     return given_warnings(config)
 
 
@@ -73,9 +78,26 @@ def nearest(word: str, known) -> str | None:
 def value_faults(config: dict, schema: dict) -> Iterator[str]:
     """Each value that the schema does not allow, and each key that it asks for, in a line."""
     errors = Draft202012Validator(schema).iter_errors(config)
+    told: list[tuple] = []
     for error in sorted(errors, key=lambda error: list(map(str, error.absolute_path))):
-        if error.validator != "additionalProperties":
-            yield f"{fault_words(error)}. {meaning(error, schema)}"
+        path = tuple(error.absolute_path)
+        if any(path[: len(above)] == above for above in told) or is_told(error):
+            continue
+        if error.validator not in ("required", "contains"):
+            told.append(path)
+        yield f"{fault_words(error)}. {meaning(error, schema)}"
+
+
+def is_told(error: ValidationError) -> bool:
+    """Whether `key_faults` tells of an error: an unknown key, or one that is missing since the nearest
+    to it is given."""
+    if error.validator == "additionalProperties":
+        return True
+    if error.validator != "required":
+        return False
+    known = error.schema["properties"]
+    unknown = [str(key) for key in error.instance if key not in known]
+    return place(error)[-1] in [nearest(key, known) for key in unknown]
 
 
 def fault_words(error: ValidationError) -> str:
@@ -84,14 +106,18 @@ def fault_words(error: ValidationError) -> str:
     given = "empty" if value is None else repr(value)
     match error.validator:
         case "anyOf":
-            inner = [one for one in error.context if one.validator not in ("const", "enum", "type")]
-            return fault_words(inner[0]) if inner else f"`{key}` is {given}, which is not allowed"
+            inner = [one for one in error.context if one.path or one.validator not in KIND_RULES]
+            if inner:
+                return fault_words(inner[0])
+            words = alternatives(word for option in limit for word in option_words(option))
+            return f"`{key}` is {given}; it must be {words}{number_hint(value)}"
         case "required":
             return f"`{'.'.join(map(str, place(error)))}` is missing"
         case "type":
             kinds = [limit] if isinstance(limit, str) else limit
-            words = " or ".join(KINDS.get(kind, "null") for kind in kinds)
-            return f"`{key}` is {given}; it must be {words}"
+            words = alternatives(KINDS.get(kind, "null") for kind in kinds)
+            hint = list_hint(value, error.schema) if "array" in kinds else number_hint(value)
+            return f"`{key}` is {given}; it must be {words}{hint}"
         case "enum":
             near = nearest(str(value), limit)
             hint = f" (did you mean {near}?)" if near else ""
@@ -104,7 +130,7 @@ def fault_words(error: ValidationError) -> str:
             return f"`{key}` is {given}; only letters, digits, - and _ may be in it"
         case name if name in LIMITS:
             words = LIMITS[name].format(limit)
-            return f"`{key}` is {given}; it must be {words}{percent_hint(key, value)}"
+            return f"`{key}` is {given}; it must be {words}{limit_hint(key, value)}"
     return f"`{key}`: {error.message}"
 
 
@@ -124,11 +150,11 @@ def listed(values) -> str:
     return ", ".join(map(str, values))
 
 
-def percent_hint(key: str, value) -> str:
-    """A guess where a share is given in per cent."""
-    if key == "porosity" and isinstance(value, int | float) and 1 < value < 100:
-        return f" (did you mean {value / 100:g}?)"
-    return ""
+def option_words(option: dict) -> list[str]:
+    """What one of several kinds of value may be: ["auto", "none"], ["a number"]."""
+    if "type" in option:
+        return [KINDS[option["type"]]]
+    return list(map(str, option.get("enum", [option.get("const")])))
 
 
 def meaning(error: ValidationError, schema: dict) -> str:
@@ -166,9 +192,14 @@ def pair_faults(config: dict) -> list[str]:
 def check_own_case(config: dict) -> None:
     """ConfigError where real scans would go to the folder of the demonstration."""
     if "scans" in config and config.get("case", settings.DEMO) == settings.DEMO:
+        fault = (
+            f"{settings.DEMO}, whose folder is the demonstration's"
+            if "case" in config
+            else "missing"
+        )
         raise ConfigError(
-            f"`case` is {settings.DEMO}, whose folder is the demonstration's: give your scans a case of "
-            "their own, such as `case: mine` (results go to results/mine)"
+            f"`case` is {fault}: give your scans a case of their own, such as `case: mine` "
+            "(results go to results/mine)"
         )
 
 
@@ -200,14 +231,36 @@ def check_region(config: dict) -> None:
 
 
 def check_platens(config: dict) -> None:
-    """ConfigError where a start needs platens that there are none of."""
-    if config.get("scans", {}).get("platens") != "none":
+    """ConfigError where platens are reversed, or a start needs some where there are none."""
+    platens = config.get("scans", {}).get("platens")
+    if isinstance(platens, list) and platens[0] >= platens[1]:
+        raise ConfigError(
+            f"scans.platens is {platens}; give [LOW, HIGH], the lower coordinate along the loading axis "
+            "first"
+        )
+    if platens != "none":
         return
     if "extrapolated" in config.get("meso", {}).get("candidates", []):
         raise ConfigError(
             "scans.platens is none, and `extrapolated` needs the motion of the platens: leave it out of "
             "meso.candidates, or say where the platens are"
         )
+
+
+def missing_scans(config: dict) -> list[str]:
+    """The scans of a configuration, however wrong in other things, that are not there."""
+    scans = config.get("scans")
+    if not isinstance(scans, dict):
+        return []
+    states = scans.get("states", [])
+    paths = [scans.get("reference"), *(states if isinstance(states, list) else [])]
+    faults = []
+    for path in filter(is_text, paths):
+        try:
+            settings.scan_files(path)
+        except ConfigError as error:
+            faults.append(str(error))
+    return faults
 
 
 def given_warnings(config: dict) -> list[str]:

@@ -1,5 +1,16 @@
 """The one family of errors a user can mend: the message gives the value, the limit, the remedy."""
 
+from pathlib import Path
+
+MARK = "ERROR: "
+"""What an error begins with in the log of a job, where it is the last thing said."""
+
+
+def error_in(log: str | Path) -> str:
+    """The error that a job has left in its log; "" where there is none."""
+    text = Path(log).read_text() if Path(log).is_file() else ""
+    return text.partition(MARK)[2].strip()
+
 
 class AddvcError(ValueError):
     """Something in the input or the configuration that the user can change."""

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
-from addvc.errors import AddvcError
+from addvc.errors import MARK, AddvcError
 
 INTERRUPTED = 130
 """Status of a job that Ctrl-C ends, as a shell has it."""
@@ -38,8 +38,9 @@ def job(snakemake) -> Iterator[logging.Logger]:
     """Progress to the log of the job and, from the level ADDVC_LOG (INFO) on, to the terminal; threads
     as the scheduler gave them.
 
-    An error the user can mend (AddvcError) is told in one paragraph and ends the job with status 1;
-    any other keeps its traceback, which goes to the log as well; Ctrl-C ends it without one."""
+    An error the user can mend (AddvcError) is told in one paragraph and ends the job with status 1; by
+    the log alone where ADDVC_LOGGER says that `snakemake_logger_plugin_addvc` tells it. Any other keeps
+    its traceback, which goes to the log as well; Ctrl-C ends it without one."""
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     path = Path(snakemake.log[0])
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -58,7 +59,9 @@ def job(snakemake) -> Iterator[logging.Logger]:
             yield log
         log.info("done in %.1f s", time.perf_counter() - start)
     except AddvcError as error:
-        log.error("ERROR: %s", error)
+        if os.environ.get("ADDVC_LOGGER"):
+            log.removeHandler(terminal)
+        log.error("%s%s", MARK, error)
         sys.exit(1)
     except Exception:
         log.error("%s", traceback.format_exc())

@@ -1,7 +1,7 @@
 """A line in the terminal for each job that is done, by the logger interface of Snakemake.
 
 `./addvc run` asks for it (`--logger addvc`). It takes the place of what Snakemake says in the terminal
-about jobs that go well, about those that have told their error themselves, and about the place in
+about jobs that go well, about those that have left their error in their log, and about the place in
 the rules where a fault of the configuration was found. Other warnings, errors and failed logs pass as
 they are. A dry run shows its table of jobs (each of them with --verbose). `.snakemake/log` has
 everything. It is beside `addvc`, which knows nothing of Snakemake.
@@ -11,12 +11,13 @@ import re
 import sys
 import time
 from logging import ERROR, WARNING, LogRecord
-from pathlib import Path
 from typing import Any
 
 from snakemake.logging import ColorizingTextHandler
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
+
+from addvc.errors import error_in
 
 __all__ = ["LogHandler"]
 
@@ -28,6 +29,7 @@ ROUTINE = (  # beginnings of messages that have no event and tell the user nothi
     "Provided ",
     "Rules claiming",
     "Select jobs",
+    "Shutting down",
     "Using shell",
     "Using workflow specific",
 )
@@ -41,6 +43,9 @@ TARGETS = "A target is `ablation`, `sensitivity` or a file below results/CASE: s
 STOPPING = "Terminating processes on user request"
 """How Snakemake answers Ctrl-C."""
 
+ENDING = "Will exit after finishing"
+"""How Snakemake answers kill."""
+
 
 def fault(message: str) -> str:
     """What a message says of the configuration, without the places in the rules that it names; "" where
@@ -50,11 +55,6 @@ def fault(message: str) -> str:
         line for line in words.splitlines() if not re.match(r'  File ".*", line \d+, in ', line)
     ]
     return found + "\n".join(lines)
-
-
-def has_told(logs: list[str]) -> bool:
-    """Whether a failed job has put its error into its log, and so into the terminal."""
-    return any("ERROR: " in Path(path).read_text() for path in logs if Path(path).is_file())
 
 
 def job_words(rule: str, wildcards: dict[str, Any]) -> str:
@@ -87,7 +87,7 @@ class LogHandler(LogHandlerBase):
         self.start = time.monotonic()
         self.jobs: dict[int, str] = {}
         self.done = ""
-        self.stopped = self.shown = False
+        self.stopped = self.shown = self.ending = False
 
     def emit(self, record: LogRecord) -> None:
         """Tell of a record what the terminal is to show."""
@@ -102,7 +102,9 @@ class LogHandler(LogHandlerBase):
         elif record.levelno >= WARNING or self.common_settings.verbose:
             self.show(record)
         elif event is None:
-            if not str(record.msg).startswith(ROUTINE):
+            if str(record.msg).startswith(ENDING):
+                self.tell_ending()
+            elif not str(record.msg).startswith(ROUTINE):
                 self.show(record)
         elif event == LogEvent.RUN_INFO:
             self.tell_jobs(record)
@@ -114,13 +116,25 @@ class LogHandler(LogHandlerBase):
             share = record.done / max(record.total, 1)
             self.say(f"{record.done} of {record.total} steps ({share:.0%}) done: {self.done}")
 
+    def tell_ending(self) -> None:
+        """That a run ends by kill, once."""
+        if not self.ending:
+            self.say(
+                "asked to stop: ends after the jobs at work; the same command goes on from there"
+            )
+        self.ending = True
+
     def tell_error(self, record: LogRecord, event: LogEvent | None) -> None:
-        """An error, once: a job that has told its error itself is only named."""
+        """An error, once: of a job what it has left in its log."""
         message = str(record.msg)
         if "At least one job did not complete" in message:
             return
-        if event == LogEvent.JOB_ERROR and has_told(record.log):
-            self.say(f"FAILED: {self.jobs.get(record.jobid, record.rule_name)}")
+        if event == LogEvent.JOB_ERROR and record.log:
+            said = (
+                "\n".join(filter(None, map(error_in, record.log)))
+                or f"see above and {record.log[0]}"
+            )
+            self.say(f"FAILED: {self.jobs.get(record.jobid, record.rule_name)}: {said}")
         elif words := fault(message):
             print(words, file=self.terminal.stream, flush=True)
         elif getattr(record, "exception", "") != "RuleException" or "CalledProcess" not in message:

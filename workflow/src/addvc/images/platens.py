@@ -1,7 +1,11 @@
 """The platens in an image: bright, even slabs across the loading axis at the ends of the image."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+
+from addvc.errors import GeometryError
 
 DISC_POINTS = 20_000  # voxels of the central disc used in each row
 MIN_BRIGHT_ROWS = 3
@@ -78,3 +82,21 @@ def _crossing(mean: NDArray, start: int, level: float) -> float:
     while row + 2 < len(mean) and mean[row + 1] >= level:
         row += 1
     return float(row + np.clip((mean[row] - level) / (mean[row] - mean[row + 1]), 0, 1))
+
+
+def given_faces(platens: Sequence[float], n: int) -> tuple[float, float]:
+    """The faces that a user gives of the platens of an image of n rows; GeometryError where they are
+    reversed or outside."""
+    if len(platens) != 2:
+        raise GeometryError(f"platens is {list(platens)}; give two coordinates, [LOW, HIGH]")
+    low, high = float(platens[0]), float(platens[1])
+    if not low < high:
+        raise GeometryError(
+            f"platens [{low:g}, {high:g}] are reversed; give [LOW, HIGH], LOW first"
+        )
+    if low < -0.5 or high > n - 0.5:
+        raise GeometryError(
+            f"platens [{low:g}, {high:g}] leave the image, which reaches from -0.5 to {n - 0.5} "
+            "along the loading axis; give them in voxels of the binned image"
+        )
+    return low, high

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from addvc.config import scan_files, scan_paths, scan_settings, voxel_size_um
 from addvc.errors import ConfigError, ScanError
+from addvc.images.platens import given_faces
 from addvc.images.scans import Crop, Scan, ScanFormat, binned_shape, open_scan
 
 FINGERPRINT_BYTES = 2**20
@@ -58,7 +59,10 @@ def check_headers(config: dict) -> str:
     found, wrong = open_all(there, form, known["bin"], known["crop"], every_slice=False)
     refuse(problems + wrong)
     region = config.get("micro", {}).get("region", "all")
-    check_slab(region, found[0].binned["xyz".index(config["loading_axis"])])
+    length = found[0].binned["xyz".index(config["loading_axis"])]
+    check_slab(region, length)
+    if isinstance(platens := config["scans"].get("platens"), list):
+        given_faces(platens, length)
     return described(found[0], len(found), voxel_size_um(config), known["bin"])
 
 
@@ -77,7 +81,7 @@ def described(first: Checked, count: int, voxel_um: float, factor: int) -> str:
     """What the scans are, from the first of them."""
     whole, binned = (" x ".join(map(str, shape)) for shape in (first.scan.shape, first.binned))
     return (
-        f"{count} scans of {whole} voxels (x, y, z) of {voxel_um:g} micrometres, "
+        f"{count} scan{'s' * (count > 1)} of {whole} voxels (x, y, z) of {voxel_um:g} micrometres, "
         f"{first.scan.dtype.name}; {binned} of {voxel_um * factor:g} once cropped and binned"
     )
 
@@ -89,20 +93,27 @@ def open_all(
     crop: Crop,
     every_slice: bool = True,
 ) -> tuple[list[Checked], list[str]]:
-    """The scans that can be used, and what is wrong with the others."""
-    found, problems = [], []
+    """The scans that can be used, and what is wrong with the others: what several share, once."""
+    found: list[Checked] = []
+    problems: dict[str, list[str]] = {}
     for path in paths:
         try:
             scan = open_scan(path, fmt, every_slice)
             _check_like(scan, found[0].scan if found else scan)
             found.append(Checked(scan, binned_shape(scan, factor, crop)))
         except ScanError as error:
-            problems.append(str(error))
-    return found, problems
+            problems.setdefault(str(error).replace(str(path), "SCAN"), []).append(str(error))
+    return found, [_of_all(alike) for alike in problems.values()]
+
+
+def _of_all(alike: Sequence[str]) -> str:
+    """The first of problems that differ in the path alone, and how many more there are."""
+    more = len(alike) - 1
+    return alike[0] + (f" (so it is with {more} more scan{'s' * (more > 1)})" if more else "")
 
 
 def refuse(problems: Sequence[str]) -> None:
-    """ScanError with all problems, if there are any; a message that several scans share once."""
+    """ScanError with all problems, if there are any, each of them once."""
     different = list(dict.fromkeys(problems))
     if len(different) == 1:
         raise ScanError(different[0])

@@ -97,9 +97,16 @@ def _check_series(path: Path, series: tifffile.TiffPageSeries, dimensions: int) 
             f"{path}: is a colour image, {series.shape} with axes {series.axes}; convert it to grey"
         )
     if series.ndim != dimensions:
-        raise ScanError(
-            f"{path}: has {series.ndim} dimensions, {series.shape}, {dimensions} are needed; "
+        remedy = (
             "give a volume as one file of many pages, or as a folder with one single page a file"
+        )
+        if series.ndim == 3:
+            remedy = (
+                "the files that a folder or a pattern holds are the slices of one scan, but this file "
+                "is a scan by itself: list such files one by one (states: [first.tif, second.tif])"
+            )
+        raise ScanError(
+            f"{path}: has {series.ndim} dimensions, {series.shape}, {dimensions} are needed; {remedy}"
         )
     if dimensions == 3 and series.dataoffset is None and len(series.pages) != series.shape[0]:
         raise ScanError(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from addvc.errors import GeometryError
 from addvc.images.levels import bin_mean, to_fine
 from addvc.images.orientation import check_no_platens_elsewhere, check_outline
-from addvc.images.platens import find_platens
+from addvc.images.platens import find_platens, given_faces
 from addvc.images.silhouette import (
     Rectangle,
     corners_filled,
@@ -175,7 +175,7 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
     n = volume.shape[axis]
     low, high = -0.5, n - 0.5
     if not isinstance(platens, str):
-        low, high = _given_faces(platens, n)
+        low, high = given_faces(platens, n)
     elif platens == "auto":
         found = find_platens(volume, axis)
         if found is None:
@@ -187,23 +187,6 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
         raise GeometryError(
             f"{high - low:.1f} rows lie between the platens ({low:.1f} to {high:.1f}), at least "
             f"{MIN_ROWS} are needed; give platens: [LOW, HIGH] or none, or check loading_axis"
-        )
-    return low, high
-
-
-def _given_faces(platens: Sequence[float], n: int) -> tuple[float, float]:
-    """Check what the user says about the platens of an image of n rows."""
-    if len(platens) != 2:
-        raise GeometryError(f"platens is {list(platens)}; give two coordinates, [LOW, HIGH]")
-    low, high = float(platens[0]), float(platens[1])
-    if not low < high:
-        raise GeometryError(
-            f"platens [{low:g}, {high:g}] are reversed; give [LOW, HIGH], LOW first"
-        )
-    if low < -0.5 or high > n - 0.5:
-        raise GeometryError(
-            f"platens [{low:g}, {high:g}] leave the image, which reaches from -0.5 to {n - 0.5} "
-            "along the loading axis; give them in voxels of the binned image"
         )
     return low, high
 
