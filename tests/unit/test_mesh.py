@@ -13,6 +13,7 @@ from addvc.fem.mesh import (
     check_mesh,
     dihedral_range,
     face_components,
+    inverted_cells,
     mean_edge_length,
     oriented,
     physical_gradients,
@@ -161,3 +162,9 @@ def test_files_keep_mesh_and_fields(mesh, tmp_path):
     assert_array_equal(on_points["displacement"], u)
     assert_array_equal(on_cells["strain"], strain)
     assert [file.name for file in path.parent.iterdir()] == ["meso.vtu"]
+
+
+def test_cells_that_a_displacement_turns_inside_out_are_counted(tets):
+    mirror = tets.points * [-2, 0, 0]
+    assert inverted_cells(tets, 0 * mirror) == inverted_cells(tets, tets.points) == 0
+    assert inverted_cells(tets, mirror) == len(tets.cells)

@@ -123,6 +123,23 @@ def test_a_residual_far_above_the_noise_has_a_warning(alone, warned):
     assert ("1.6 times that of noise alone (at most 1.5)" in told) == warned
 
 
+@pytest.mark.parametrize(("share", "warned"), [(0.0, False), (0.01, False), (0.022, True)])
+def test_elements_turned_inside_out_have_a_warning(share, warned):
+    folded = GOOD | {"meso12": GOOD["meso12"] | {"inverted": share}}
+    told = " ".join(warnings(summary(folded)))
+    assert ("meso12 2.2% (at most 1%)" in told) == warned == ("Fig. 10" in told)
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(1, "1 strut that"), (91, "91 struts that"), (0, None)]
+)
+def test_bridges_are_counted_on_the_front_page(count, words):
+    counts = {"stubs": 0, "necks": 0, "welds": 0, "bridges": count}
+    told = front_page(summary(GOOD) | {"topology": counts}, CONFIG, SCANS)
+    assert (words or "mesh.mend") in told or not words
+    assert ("mesh.mend" in told) == bool(words)
+
+
 def test_sigma_of_noise_alone_stands_beside_that_of_the_residual():
     known = GOOD | {"noise_std": 0.523}
     assert "sigma(r) 0.56 (noise alone 0.52), 4 it" in closing_lines(summary(known), "results/a")

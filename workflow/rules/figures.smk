@@ -209,7 +209,7 @@ rule more_topology:
         f"{R}/geometry/topology.json",
     output:
         table=shown(
-            "more_topology.csv", "more_topology", "Tables", "stubs, necks and welds"
+            "more_topology.csv", "more_topology", "Tables", "each stub, neck and weld"
         ),
         picture=shown(
             "more_topology.png", "more_topology", "Meshes", "stubs, necks and welds"
@@ -757,7 +757,7 @@ if STATES and HAS_TRUTH:
                 "more_struts_truth.csv",
                 "more_struts_truth",
                 "Tables",
-                "struts against the truth",
+                "figures of struts against the truth",
             ),
             pictures=[
                 shown(

@@ -13,6 +13,9 @@ LEAST_STRAIN = 1e-3
 LEAST_POINTS = 8
 """Of a band, for a plane to be laid through it."""
 
+LUMP = 0.7
+"""Flatness from which a band is called a lump, and its angle is not told."""
+
 MEANING = {
     "points": "points of the grid where the strain of a cell is known",
     "mean_strain": "mean over them of the stretch along the loading axis less 1",

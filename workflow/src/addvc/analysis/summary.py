@@ -13,6 +13,7 @@ from addvc import __version__
 from addvc.analysis.validity import verdict
 from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_vtu
+from addvc.fem.mesh import Mesh, inverted_cells
 from addvc.images.files import read_json
 
 PACKAGES = (
@@ -119,12 +120,14 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
 
 
 def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
-    """Convergence, residual, validity and, with a truth, the error of one mesh in one state."""
+    """Convergence, residual, validity, share of elements turned inside out and, with a truth, the error
+    of one mesh in one state."""
     name = f"{mesh}_state{state}"
     solution, notes = load_solution(folder / f"dvc/{name}.h5")
     residual = read_json(folder / f"analysis/residual_{name}.json")
-    _, _, point, _ = read_vtu(folder / f"fields/{name}.vtu")
+    points, cells, point, _ = read_vtu(folder / f"fields/{name}.vtu")
     return {
+        "inverted": inverted_cells(Mesh(points, cells), point["displacement"]) / len(cells),
         "start": notes.get("best"),
         "l_e": notes.get("l_e"),
         "l_l": notes.get("l_l"),

@@ -43,6 +43,11 @@ def physical_gradients(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return gradients, weights * np.linalg.det(jacobian)
 
 
+def inverted_cells(mesh: Mesh, u: np.ndarray) -> int:
+    """How many cells a displacement u (n, 3), voxels, turns inside out."""
+    return int((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).sum())
+
+
 def cell_volumes(mesh: Mesh) -> np.ndarray:
     """Signed volume of each cell (m,), voxel^3; negative where the cell is inverted."""
     if not mesh.is_tet:

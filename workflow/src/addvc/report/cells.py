@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from addvc.analysis.localisation import FACTOR
+from addvc.analysis.localisation import FACTOR, LUMP
 from addvc.analysis.strut_store import read_columns
 from addvc.report import style
 from addvc.report.case import Case
@@ -36,7 +36,7 @@ def cell_strains(case: Case, outputs: Iterable[str], truth: bool) -> None:
     profiles(left, case, grids, truth)
     shares(right, case, figures, truth)
     style.headline(left, "mean over planes across the loading axis", len(states))
-    style.headline(right, f"bands: over {FACTOR:g} times the mean", len(states) + 1)
+    style.headline(right, f"all bands: over {FACTOR:g} times the mean", len(states) + 1)
     style.save(fig, outputs)
 
 
@@ -87,8 +87,9 @@ def draw_map(ax: Axes, part: np.ndarray, right: np.ndarray, up: np.ndarray) -> N
 
 
 def band_line(ax: Axes, band: dict, way: tuple[int, int, int], lines: list[np.ndarray]) -> None:
-    """Where the plane through the largest band meets the plane of a map, if it crosses it."""
-    if not band["normal"]:
+    """Where the plane through the largest band meets the plane of a map, if it crosses it and the band
+    is no lump."""
+    if not band["normal"] or band["flatness"] >= LUMP:
         return
     flat, axis, normal = way
     n, centre = np.array(band["normal"]), np.array(band["centre"])
@@ -108,11 +109,12 @@ def band_line(ax: Axes, band: dict, way: tuple[int, int, int], lines: list[np.nd
 def band_words(band: dict) -> str:
     """What the largest band holds, how thick and how tilted it is."""
     if not band["bands"]:
-        return "no band\n\n\n"
+        return "no band\n\n\n\n"
+    tilt = "a lump" if band["flatness"] >= LUMP else f"{band['angle']:.0f}° in space"
     return (
-        f"band: {band['band_volume_share']:.0%} volume,\n"
-        f"{band['band_strain_share']:.0%} of strain,\n"
-        f"{band['thickness']:.0f} voxels thick, {band['angle']:.0f}°"
+        f"largest band: {band['band_volume_share']:.0%}\nof the volume, "
+        f"{band['band_strain_share']:.0%}\nof the compression,\n"
+        f"{band['thickness']:.0f} voxels, {tilt}"
     )
 
 

@@ -70,7 +70,6 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         xlim=(-reach, reach),
         ylim=(low, low + (high - low) * (1.1 + 0.07 * (len(case.states) + 1))),
     )
-    fig.legend(handles=_state_handles(case), loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 
 

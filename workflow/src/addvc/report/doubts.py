@@ -4,6 +4,7 @@ from addvc.analysis.balance import refusal
 from addvc.report.page_tables import figure, micro_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
+FOLDED = 0.01  # share of elements turned inside out
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
 
 
@@ -101,6 +102,7 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
             f"- State {state['state']} could not be registered: at least half of its nodes "
             "have a residual far above the noise of the images."
         )
+    found += fold_warnings(state, summary)
     return found + equilibrium_warnings(state) + residual_warnings(state, micro)
 
 
@@ -113,6 +115,19 @@ def loop_warnings(state: dict, mesh: str) -> list[str]:
         f"- State {state['state']}, {mesh}: the loop did not end in {one['iterations']} iterations "
         f"(last rms(du) {figure(one['last_step'], '.1e')} voxel). Look at the residual maps "
         "(Fig. 13); a longer regularisation length or a better start may help."
+    ]
+
+
+def fold_warnings(state: dict, summary: dict) -> list[str]:
+    """One line where a displacement turns more than a few elements of a mesh inside out."""
+    shares = {mesh: state[mesh].get("inverted") or 0.0 for mesh in summary["meshes"]}
+    folded = [f"{mesh} {share:.1%}" for mesh, share in shares.items() if share > FOLDED]
+    if not folded:
+        return []
+    return [
+        f"- State {state['state']}: the displacement turns elements inside out, which no material does: "
+        f"{', '.join(folded)} (at most {FOLDED:.0%}). Its strains are not to be used there; on a mesh "
+        "of meso DVC (Fig. 10) struts fold more sharply than it can follow, which micro DVC may mend."
     ]
 
 

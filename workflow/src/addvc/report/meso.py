@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from addvc.fem.mesh import Mesh, cell_volumes
+from addvc.fem.mesh import Mesh, inverted_cells
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, oblique, render
@@ -37,7 +37,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
 
 def _inverted(mesh: Mesh, u: np.ndarray) -> str:
     """How many tetrahedra the displacement turns inside out, where it does."""
-    count = int((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).sum())
+    count = inverted_cells(mesh, u)
     return f"\n{count} of {len(mesh.cells):,} inverted" if count else ""
 
 

@@ -51,7 +51,7 @@ def marked(case: Case, outputs: Iterable[str]) -> None:
     fig, axes = style.panels(1, 2, pictures[0].aspect, spare=25, below=14)
     for number, (ax, picture) in enumerate(zip(axes[0], pictures, strict=True)):
         picture.show(ax)
-        style.headline(ax, "from one side" if number == 0 else "from a quarter turn on", number)
+        style.headline(ax, "from one side" if number == 0 else "a quarter turn further", number)
         style.axis_arrows(ax, views[number].right, views[number].up)
     style.scale_bar(axes[0, 0], case.voxel_um, 0.4)
     handles = [

@@ -32,8 +32,10 @@ def uncertainty(case: Case, outputs: Iterable[str], truth: bool) -> None:
         _calibration(panels[1], case)
         style.headline(panels[1], "errors of the nodes", 2)
         right.legend(loc="outside lower center", handles=panels[1].get_legend_handles_labels()[0])
-    spread = f"{found['draws']} draws: a node to {found['sampling_error']:.0%}"
-    text = f"rms {found['rms']:.3f}, p95 {found['p95']:.3f} voxels; {spread}"
+    text = (
+        f"all nodes: rms {found['rms']:.3f}, p95 {found['p95']:.3f} voxels\n"
+        f"by {found['draws']} draws of noise, which leave ±{found['sampling_error']:.0%} on one node"
+    )
     left.supxlabel(text, fontsize=8)
     style.save(fig, outputs)
 
@@ -45,11 +47,11 @@ def _map(fig, case: Case, nodes: np.ndarray, title: str) -> None:
     layer = Layer(mesh.points, boundary(mesh)[0], values=nodes, norm=norm, cmap=style.MAGNITUDE)
     ax = fig.subplots()
     render([layer], view, 85).show(ax)
-    style.headline(ax, f"standard uncertainty, {title}", 0)
+    style.headline(ax, f"of the nodes, {title}", 0)
     style.scale_bar(ax, case.voxel_um, 0.4)
     style.axis_arrows(ax, view.right, view.up)
-    label = f"from noise ({style.voxels(case.voxel_um)})"
-    place = {"location": "top", "shrink": 0.8, "aspect": 30}
+    label = f"standard uncertainty ({style.voxels(case.voxel_um)})"
+    place = {"location": "bottom", "shrink": 0.8, "aspect": 30}
     style.colour_bar(fig, ax, norm, style.MAGNITUDE, label, **place)
 
 

@@ -104,7 +104,10 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
     half = 0.45 * case.cell_size
     places = _places(case, mesh, np.linalg.norm(micro - meso, axis=1), half)
     deformed, gamma = case.image(state), case.gamma
-    titles = [r"$\Omega_r$", *(_zoom_title(case, n, state) for n in (case.finest, case.micro[0]))]
+    titles = [
+        "struts of $I_r$",
+        *(_zoom_title(case, n, state) for n in (case.finest, case.micro[0])),
+    ]
     fig, axes = style.panels(len(places), 3, 1.0, below=6)
     for row, node in enumerate(places):
         view = _across(micro[node] - meso[node], case.specimen.axis)
@@ -119,14 +122,15 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
             render(layers, view, 55, fit).show(axes[row, column])
             style.headline(axes[row, column], titles[column], 3 * row + column)
         style.scale_bar(axes[row, 0], case.voxel_um)
-    colours = {r"$\Omega_d$: segmented $I_d$": style.SOLID, r"$\Omega_r + u$: carried": style.RED}
+    label = case.labels[state]
+    colours = {f"segmented $I_d$, {label}": style.SOLID, "struts of $I_r$, carried": style.RED}
     handles = [Patch(color=colour, label=label) for label, colour in colours.items()]
     fig.legend(handles=handles, loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 
 
 def _zoom_title(case: Case, name: str, state: int) -> str:
-    return rf"$\Omega_d$ and $\Omega_r + u$, {name}: {case.verdict(name, state)}"
+    return f"carried by {name}: {case.verdict(name, state)}"
 
 
 def _places(case: Case, mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:

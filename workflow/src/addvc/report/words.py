@@ -4,6 +4,7 @@ import textwrap
 
 import yaml
 
+from addvc.analysis.localisation import LUMP
 from addvc.errors import AddvcError
 from addvc.report.doubts import failed_checks, warnings
 from addvc.report.methods import methods
@@ -112,7 +113,7 @@ def answer(summary: dict) -> list[str]:
             f"valid{noise_words(state, size)}{error_words(found['error'])}."
             f"{strut_words(state.get('struts'))}" + band_words(state.get("cells"))
         )
-    return [*lines, "", cost_words(summary["cost"])]
+    return [*lines, *bridge_words(summary.get("topology")), "", cost_words(summary["cost"])]
 
 
 def shown(picture: str | None, summary: dict) -> list[str]:
@@ -160,13 +161,27 @@ def noise_words(state: dict, voxel_um: float) -> str:
     return f", known to {rms:.3f} voxel ({rms * voxel_um:.2g} micrometres) as far as noise goes"
 
 
+def bridge_words(counts: dict | None) -> list[str]:
+    """How many struts are in the mesh though the threshold had broken them."""
+    if not counts or not counts.get("bridges"):
+        return []
+    count, rods = counts["bridges"], "a rod" if counts["bridges"] == 1 else "rods"
+    return [
+        "",
+        f"{count} strut{'s' * (count > 1)} that the threshold had broken or lost, but a lower one shows "
+        f"whole, went into the mesh as {rods} (`mesh.mend`): the figure of its topology shows where.",
+    ]
+
+
 def cost_words(cost: dict) -> str:
     """What it took, in a sentence."""
-    cpu, memory = (sum(c["cpu_s"] for c in cost.values()), [c["max_rss_mb"] for c in cost.values()])
+    cpu, wall = (sum(c[key] for c in cost.values()) for key in ("cpu_s", "wall_s"))
+    memory = [c["max_rss_mb"] for c in cost.values()]
     micro = cost.get("micro_dvc", {"cpu_s": 0.0, "jobs": 0})
     each = f", {micro['cpu_s'] / micro['jobs']:.0f} s a job of micro DVC" if micro["jobs"] else ""
     return (
-        f"It took {cpu / 60:.1f} minutes of CPU without figures{each}, and at most "
+        f"It took {cpu / 60:.1f} minutes of CPU ({wall / 60:.1f} minutes of jobs, one after the "
+        f"other) without figures{each}, and at most "
         f"{max(memory, default=0) / 1000:.1f} GB of memory in a job."
     )
 
@@ -205,7 +220,7 @@ def band_words(cells: dict | None) -> str:
     shape = (
         f"{cells['thickness']:.0f} voxels thick, its normal {cells['angle']:.0f} degrees from the "
         "loading axis"
-        if cells["flatness"] < 0.7
+        if cells["flatness"] < LUMP
         else "a lump rather than a plate"
     )
     return (
