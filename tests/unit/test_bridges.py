@@ -58,6 +58,7 @@ def test_a_broken_strut_is_one_again_with_a_mesh_in_one_piece():
     raised, rows = bridged(grey, grey, LEVELS, REGION, SIZE)
     (row,) = rows
     assert row["position"] == pytest.approx([30, 20, 20], abs=1)
+    assert np.abs(row["direction"]) == pytest.approx([1, 0, 0], abs=0.1)
     assert row["length"] == pytest.approx(3, abs=1.5)
     assert LINKED <= row["radius"] <= RADIUS + 0.1
     before, after = (region_solid(g, LEVELS, REGION, 0.1)[0] for g in (grey, raised))

@@ -144,6 +144,7 @@ rule micro_dvc:
         reference=f"{R}/volumes/smooth0.h5",
         deformed=f"{R}/volumes/smooth{{state}}.h5",
         threshold=f"{R}/geometry/threshold.json",
+        bridges=f"{R}/geometry/bridges.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
         start=f"{R}/dvc/micro_start_state{{state}}.h5",
     output:

@@ -160,6 +160,7 @@ if STATES:
             reference=f"{R}/volumes/smooth0.h5",
             deformed=f"{R}/volumes/smooth{{state}}.h5",
             threshold=given("threshold"),
+            bridges=given("bridges"),
             factor=given("factor"),
             start=given("start"),
         output:

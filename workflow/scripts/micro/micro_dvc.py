@@ -1,8 +1,8 @@
 """Micro DVC of one state by one method, from the best start on the micro mesh."""
 
 from addvc.runtime import job
-from addvc.correlation.corotational import Problem, corotational
-from addvc.correlation.micro import ladder, mending, micro_reference, shell_of, stages
+from addvc.correlation.corotational import corotational
+from addvc.correlation.micro import ladder, mending, micro_reference, problem_of, shell_of, stages
 from addvc.correlation.register import Stop, System, register
 from addvc.correlation.store import load_factor, load_field, load_order, save_solution
 from addvc.fem.io import read_mesh
@@ -22,7 +22,7 @@ with job(snakemake):
         solution = register(System(reference, extra, factor), deformed, start, stop, "micro DVC")
     else:
         order, notes = load_order(source.factor)
-        problem = Problem(reference, notes["c"], micro["nu"], notes["l_e"], order)
+        problem = problem_of(reference, notes, micro["nu"], order, read_json(source.bridges))
         levels, blur = read_json(source.threshold), snakemake.params.blur
         plan = stages(micro, levels, method), mending(micro, levels)
         cutoffs = ladder(micro, levels, blur, method)

@@ -130,6 +130,7 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
         "inverted": inverted_cells(Mesh(points, cells), point["displacement"]) / len(cells),
         "start": notes.get("best"),
         "l_e": notes.get("l_e"),
+        "torn": notes.get("torn", []),
         "l_l": notes.get("l_l"),
         "converged": solution.converged,
         "iterations": solution.iterations,

@@ -19,6 +19,7 @@ from addvc.correlation.metric import Reference, hessian, reference_on
 from addvc.correlation.register import Stop, System
 from addvc.correlation.regularisation import elastic_weight, equilibrium_gap
 from addvc.correlation.store import load_factor, load_notes, load_order
+from addvc.correlation.torn import joints_of
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.assembly import node_pattern
 from addvc.fem.mesh import Mesh
@@ -97,6 +98,15 @@ def elastic(
     c = elastic_weight(reference.mesh, h, k, options.l_e, options.period, options.axis)
     extra = (c * k).tocsr()
     return h + extra, extra, {"c": c, "l_e": options.l_e}
+
+
+def problem_of(
+    reference: Reference, notes: dict, nu: float, order: np.ndarray, bridges: list[dict]
+) -> Problem:
+    """The problem of `elastic`, from the notes and the order that were stored with its factor, with the
+    rows of bridges.json."""
+    joints = joints_of(reference.mesh, bridges)
+    return Problem(reference, notes["c"], nu, notes["l_e"], order, joints=joints)
 
 
 def system_at_rest(

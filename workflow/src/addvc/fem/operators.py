@@ -20,9 +20,14 @@ def lame(nu: float, young: float = 1.0) -> tuple[float, float]:
 
 
 def stiffness(
-    mesh: Mesh, nu: float, pattern: Pattern | None = None, rotation: np.ndarray | None = None
+    mesh: Mesh,
+    nu: float,
+    pattern: Pattern | None = None,
+    rotation: np.ndarray | None = None,
+    modulus: np.ndarray | float = 1.0,
 ) -> sparse.bsr_matrix:
-    """K (3 n, 3 n) with E = 1: symmetric, its null space the six rigid motions of the mesh.
+    """K (3 n, 3 n) with E = `modulus`, of each cell (m,) or of all: symmetric, its null space the six
+    rigid motions of the mesh.
 
     With a rotation (m, 3, 3) of each tetrahedron, K_R: each cell's R K R^T, which for an isotropic
     solid is K of rotated gradients."""
@@ -30,6 +35,7 @@ def stiffness(
     gradients, weights = physical_gradients(mesh)
     if rotation is not None:
         gradients = np.einsum("eij,eqaj->eqai", rotation, gradients)
+    weights = weights * np.reshape(modulus, (-1, 1))
     blocks = scatter_stiffness(pattern.slot, gradients, weights, *lame(nu), len(pattern.indices))
     return block_matrix(pattern, blocks)
 
@@ -57,8 +63,10 @@ def strain(mesh: Mesh, u: np.ndarray, finite: bool = False) -> np.ndarray:
     return small + np.einsum("eki,ekj->eij", slope, slope) / 2 if finite else small
 
 
-def corotational_load(mesh: Mesh, nu: float, rotation: np.ndarray) -> np.ndarray:
-    """f_R = sum R K (R^T X - X) (3 n,), so that K_R u + f_R are the elastic forces of u (E = 1).
+def corotational_load(
+    mesh: Mesh, nu: float, rotation: np.ndarray, modulus: np.ndarray | float = 1.0
+) -> np.ndarray:
+    """f_R = sum R K (R^T X - X) (3 n,), so that K_R u + f_R are the elastic forces of u (E = `modulus`).
 
     They vanish where each tetrahedron turns by just its rotation (m, 3, 3) [Mueller & Gross 2004]."""
     lam, mu = lame(nu)
@@ -66,7 +74,7 @@ def corotational_load(mesh: Mesh, nu: float, rotation: np.ndarray) -> np.ndarray
     small = (rotation + rotation.transpose(0, 2, 1)) / 2 - np.eye(3)
     trace = np.einsum("eii->e", small)
     stress = lam * trace[:, None, None] * np.eye(3) + 2 * mu * small
-    turned = np.einsum("e,eij,ejk->eik", weights[:, 0], rotation, stress)
+    turned = np.einsum("e,eij,ejk->eik", weights[:, 0] * modulus, rotation, stress)
     force = np.einsum("eik,eak->eai", turned, gradients[:, 0]).reshape(-1, 3)
     nodes, n = mesh.cells.ravel(), len(mesh.points)
     return np.stack([np.bincount(nodes, column, n) for column in force.T], axis=1).ravel()

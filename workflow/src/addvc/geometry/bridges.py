@@ -178,13 +178,15 @@ def raise_rod(grey: np.ndarray, rod: Bridge, gamma: float, slope: float, most: f
 
 
 def listed(bridges: list[Bridge]) -> list[dict]:
-    """The bridges as data, the longest first."""
+    """The bridges as data, the longest first; `direction`: the unit vector along them."""
+    ends = [one.points[-1] - one.points[0] for one in bridges]
     rows = [
         {
             "position": one.points[len(one.points) // 2].tolist(),
+            "direction": (end / max(np.linalg.norm(end), 1e-12)).tolist(),
             "length": one.length,
             "radius": float(one.radii.mean()),
         }
-        for one in bridges
+        for one, end in zip(bridges, ends, strict=True)
     ]
     return sorted(rows, key=lambda row: -row["length"])

@@ -102,7 +102,7 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
             f"- State {state['state']} could not be registered: at least half of its nodes "
             "have a residual far above the noise of the images."
         )
-    found += fold_warnings(state, summary)
+    found += fold_warnings(state, summary) + torn_warnings(state, micro)
     return found + equilibrium_warnings(state) + residual_warnings(state, micro)
 
 
@@ -128,6 +128,20 @@ def fold_warnings(state: dict, summary: dict) -> list[str]:
         f"- State {state['state']}: the displacement turns elements inside out, which no material does: "
         f"{', '.join(folded)} (at most {FOLDED:.0%}). Its strains are not to be used there; on a mesh "
         "of meso DVC (Fig. 10) struts fold more sharply than it can follow, which micro DVC may mend."
+    ]
+
+
+def torn_warnings(state: dict, micro: str) -> list[str]:
+    """One line where a state tears bridges: there was no strut."""
+    torn = state[micro].get("torn") or []
+    if not torn:
+        return []
+    places = "; ".join(", ".join(f"{x:.0f}" for x in place) for place in torn)
+    count = "1 bridge" if len(torn) == 1 else f"{len(torn)} bridges"
+    return [
+        f"- State {state['state']}, {micro}: {count} of mesh.mend did not hold, at (x, y, z in voxels) "
+        f"{places}: the images show two halves that move apart, and the mesh was cut there. Strain in the "
+        "cut, a layer of cells, means nothing."
     ]
 
 
