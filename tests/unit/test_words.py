@@ -130,6 +130,12 @@ def test_elements_turned_inside_out_have_a_warning(share, warned):
     assert ("meso12 2.2% (at most 1%)" in told) == warned == ("Fig. 10" in told)
 
 
+def test_torn_bridges_have_a_warning_with_their_places():
+    torn = GOOD | {"micro": GOOD["micro"] | {"torn": [[25.4, 37.2, 53.2], [1, 2, 3]]}}
+    (told,) = warnings(summary(torn))
+    assert "State 1, micro: 2 bridges" in told and "25, 37, 53; 1, 2, 3" in told
+
+
 @pytest.mark.parametrize(
     ("count", "words"), [(1, "1 strut that"), (91, "91 struts that"), (0, None)]
 )
