@@ -75,6 +75,8 @@ def test_states_are_called_by_their_strain_or_their_number():
     virtual = {"scans": {}, "virtual": {"strains": [0.02]}}
     assert settings.state_labels(twin) == {1: "3.4 %", 2: "28.5 %"}
     assert settings.state_labels(virtual) == {1: "2.0 %"}
+    near = {"scans": {}, "virtual": {"strains": [0.02, 0.0204]}}
+    assert settings.state_labels(near) == {1: "2.00 %", 2: "2.04 %"}
     assert settings.state_labels({"scans": {"states": ["a", "b"]}}) == {1: "state 1", 2: "state 2"}
     assert settings.state_labels({"scans": {"states": []}}) == {}
 

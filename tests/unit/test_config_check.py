@@ -45,6 +45,28 @@ def test_a_misspelt_key_is_told_with_the_nearest_one(config, key, meant):
     assert f"did you mean `{meant}`?" in str(told.value)
 
 
+def test_an_unknown_key_among_several_kinds_of_value_is_told_once():
+    with pytest.raises(ConfigError, match=r"^unknown key `micro.region.hi`: did you mean") as told:
+        check_config({"micro": {"region": {"low": 5, "hi": 3}}}, SCHEMA)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        ({"twin": {"strains": [0.1, 0.05]}}, r"twin.strains is \[0.1, 0.05\]; they must increase"),
+        ({"porosity": 0.5}, "`porosity` is 0.5; a twin has at least 0.85"),
+        (
+            {"twin": {"size": "tiny", "cell_size": 60}},
+            "cell_size is 60; 8 to 36 voxels are possible",
+        ),
+    ],
+)
+def test_a_twin_that_cannot_be_made_is_told_before_any_work(config, words):
+    with pytest.raises(ConfigError, match=words):
+        check_config(config, SCHEMA)
+
+
 def test_a_key_like_no_other_gets_the_list_of_those_known():
     with pytest.raises(ConfigError, match=r"unknown key `images\.qqqq`: see config/README") as told:
         check_config({"images": {"qqqq": 1}}, SCHEMA)
@@ -80,7 +102,7 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         ({"geometry": {"cell_size": "1.2mm"}}, r"auto or a number \(write 1.2, without its unit\)"),
         (
             scans(crop=[[-5, 10], None, None]),
-            r"`scans.crop.0.0` is -5; it must be at least 0\. \[\[x0",
+            r"`scans.crop\[0\]\[0\]` is -5; it must be at least 0\. \[\[x0",
         ),
         (
             scans(states="b.tif"),
@@ -102,6 +124,8 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         ({"meso": {"candidates": ["zero", "zero"]}}, "nothing may be in it twice"),
         ({"meso": {"sizes": [12, 33]}}, "must fall from coarse to fine"),
         ({"twin": {}}, "both `twin` and `scans`"),
+        ({"micro": {"tolerance": "1e-3"}}, r"\(write 0.001: YAML takes 1e-3 for a text\)"),
+        ({"micro": {"region": {"low": "a"}}}, "`micro.region.low` is 'a'; it must be a number"),
     ],
 )
 def test_a_wrong_value_is_told_with_its_limit_and_what_it_means(changes, words):

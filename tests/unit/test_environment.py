@@ -304,8 +304,10 @@ def test_a_second_run_is_refused_even_where_the_lock_is_gone(ready):
     with subprocess.Popen(words, cwd=ready.folder) as live:
         refused, calls = ready("run", "-c1")
         looked, _ = ready("run", "-c1", "-n")
+        shown = [ready("run", words)[0] for words in ("-pn", "--help", "--dag", "--dry-run")]
         live.terminate()
     assert refused.returncode == 1 and "another clone can run beside it" in refused.stderr
+    assert not any("at work" in one.stderr for one in shown)
     assert not calls and "at work" not in looked.stderr
 
 

@@ -16,7 +16,9 @@ ORDER = ["images", "fem", "geometry", "correlation", "analysis", "report"]
 TRUTHS = {PACKAGE / "analysis/truth.py", PACKAGE / "analysis/mesh_truth.py"}
 FREE = {"errors", "config"}
 MAY_IMPORT = {name: {*ORDER[: n + 1], *FREE} for n, name in enumerate(ORDER)}
-MAY_IMPORT["twin"] = {"twin", "images", "fem", "errors"}
+MAY_IMPORT["twin"] = {"twin", "images", "fem", "errors", "config"}
+TOP = {path.stem for path in PACKAGE.glob("*.py")}
+NUMERICS = {"numpy", "scipy", "numba", "skimage", "matplotlib", "pyvista", "meshio"}
 
 NEEDED = {"output", "log", "benchmark", "conda", "threads", "resources", "params", "script"}
 WITHOUT_SCRIPT = {"all", "figures", "ablation", "sensitivity"}
@@ -95,6 +97,15 @@ def test_an_import_only_goes_to_the_left():
         and not (name in JUDGES and target.split(".")[0] == "twin")
     ]
     assert wrong == []
+
+
+def test_the_modules_that_rules_load_need_no_numerics():
+    """They are loaded anew for each job; readme.py alone is for us."""
+    for path in sorted(PACKAGE.glob("*.py")):
+        needed = {name.split(".")[0] for name in imported(path)}
+        inside = {name.split(".")[0] for name in inside_addvc(path)}
+        assert not needed & NUMERICS, path.name
+        assert inside <= TOP or path.name == "readme.py", path.name
 
 
 def test_only_judges_know_the_truth():

@@ -1,5 +1,6 @@
 """Tables of README.md from a summary."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from addvc import readme
 from addvc.errors import AddvcError
 
+ROOT = Path(__file__).parents[2]
 RESULT = {"converged": True, "error": {"rms": 0.0871, "p95": 0.1449}}
 SUMMARY = {
     "meshes": {"meso12": {}, "micro": {}},
@@ -43,7 +45,14 @@ def test_other_tools_have_rows_of_their_own():
     assert readme.accuracy(SUMMARY, peers).splitlines()[4:] == ["| elastix 8 | – | 0.138 / 0.246 |"]
 
 
-def test_every_rule_is_in_one_stage():
+def test_every_rule_of_a_stage_exists_and_is_in_no_other():
+    text = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
+    known = re.findall(r"^ *(?:use rule \w+ as|rule) (\w+)", text, re.M)
+    listed = [rule for rules in readme.STAGES.values() for rule in rules]
+    assert len(set(listed)) == len(listed) and set(listed) <= set(known)
+
+
+def test_cost_is_summed_by_stage():
     lines = readme.cost(SUMMARY).splitlines()[2:]
     seconds = [float(line.split("|")[2]) for line in lines]
     assert [line.split("|")[1].strip() for line in lines] == [
@@ -64,6 +73,6 @@ def test_missing_marks_are_named():
 
 
 def test_readme_has_the_marks():
-    text = (Path(__file__).parents[2] / "README.md").read_text()
+    text = (ROOT / "README.md").read_text()
     filled = readme.filled(text, {"accuracy": "of accuracy", "cost": "of cost"})
     assert filled.index("\nof accuracy\n") < filled.index("\nof cost\n")

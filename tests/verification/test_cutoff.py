@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from addvc.config import chooses
+from addvc.correlation import corotational as corotational_module
 from addvc.correlation.corotational import (
     Mending,
     Stage,
@@ -12,6 +13,7 @@ from addvc.correlation.corotational import (
     with_cutoff,
 )
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial_of
+from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.metric import hessian
 from addvc.correlation.micro import ladder
 from addvc.correlation.register import Stop, register
@@ -100,10 +102,52 @@ def test_a_lost_strut_does_not_ask_for_a_short_length(problem):
     start = 8 * bump[:, None] * np.array([0.0, 0.6, 0.8])
     stage, mending = Stage(True, None, Stop(1e-2, 10)), Mending(2, 6.0, most=0.5)
     lengths = [
-        with_cutoff(problem, deformed, start, stage, LADDER, given)[0].cutoff
+        with_cutoff(problem, deformed, start, stage, LADDER, given).problem.cutoff
         for given in (None, mending)
     ]
     assert lengths[1] > 2 * lengths[0]
+
+
+@pytest.fixture
+def chosen(problem, monkeypatch):
+    """chosen(rungs, steps): the choice where the least risk is on these rungs, one after the other, and
+    the stages end by these steps; and the l_E of the stages that were run."""
+
+    def choose(rungs, steps=(1e-4, 1e-4)):
+        lengths, rest = [], np.zeros_like(problem.reference.mesh.points)
+        rungs, ends = iter(rungs), iter(steps)
+
+        def stage_of(given, stage, deformed, u, name, system):
+            lengths.append(given.cutoff / problem.cutoff)
+            return Solution(u, [next(ends)], True, 0.0, {}), {}
+
+        monkeypatch.setattr(corotational_module, "run", stage_of)
+        monkeypatch.setattr(
+            corotational_module, "least_risk", lambda *_: (next(rungs), [{"times": 1.0}])
+        )
+        return with_cutoff(problem, image(lambda x: x, 31), rest, PLAN[0], LADDER), lengths
+
+    return choose
+
+
+def test_far_from_where_it_was_a_stage_is_run_and_the_choice_made_again(problem, chosen):
+    choice, lengths = chosen([-4, -3])
+    assert lengths == [pytest.approx(RATIO**-4)] and len(choice.steps) == 1
+    assert choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO**-3)
+    choice, lengths = chosen([1])
+    assert lengths == [] and choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO)
+
+
+def test_back_on_the_first_rung_the_images_are_looked_at_again(problem, chosen):
+    choice, lengths = chosen([-4, 0, 1])
+    assert lengths == [pytest.approx(RATIO**-4), pytest.approx(1)]
+    assert choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO)
+
+
+def test_a_stage_that_is_not_finite_leaves_the_length_as_it_was(problem, chosen):
+    choice, lengths = chosen([-4], [np.nan])
+    assert len(lengths) == 1 and choice.steps == []
+    assert choice.problem.cutoff == problem.cutoff
 
 
 def test_a_given_length_is_not_chosen():

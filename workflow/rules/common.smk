@@ -1,5 +1,6 @@
 import os
 import sys
+import time
 from pathlib import Path
 
 import yaml
@@ -15,6 +16,7 @@ from addvc.config_check import check_config
 from addvc.errors import AddvcError, error_in
 from addvc.provenance import code_hash
 
+STARTED = time.time()
 SCHEMA = WORKFLOW / "schemas/config.schema.yaml"
 
 

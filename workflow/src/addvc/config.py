@@ -12,6 +12,14 @@ NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
 NOMINAL_CELL = 28.0
 DEMO = "twin"  # the case that the default configuration has
 TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
+TWIN_SIZES = {
+    "tiny": (72, 84, 72),
+    "default": (120, 140, 120),
+    "mid": (200, 240, 200),
+    "paper": (504, 551, 507),
+}  # shape (nx, ny, nz) of the binned image of a twin, voxels
+TWIN_POROSITY = 0.85  # at least
+TWIN_CELL = 8.0  # voxels, at least
 IMAGING = (  # keys of `twin` that change its scans, but neither foam nor motion
     "bin",
     "noise",
@@ -89,11 +97,17 @@ def state_strains(config: dict) -> list[float | None]:
 
 
 def state_labels(config: dict) -> dict[int, str]:
-    """What figures call each state: its nominal strain, or its number."""
-    return {
-        n: f"state {n}" if strain is None else f"{100 * strain:.1f} %"
-        for n, strain in enumerate(state_strains(config), start=1)
-    }
+    """What figures call each state: its nominal strain, with as many digits as tell them apart, or its
+    number."""
+    strains = dict(enumerate(state_strains(config), start=1))
+    for digits in range(1, 6):
+        labels = {
+            n: f"state {n}" if strain is None else f"{100 * strain:.{digits}f} %"
+            for n, strain in strains.items()
+        }
+        if len(set(labels.values())) == len(labels):
+            return labels
+    return {n: f"state {n}" for n in strains}
 
 
 def meso_names(config: dict) -> list[str]:

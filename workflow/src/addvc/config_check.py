@@ -1,6 +1,7 @@
 """What is wrong with a configuration: all of it at once, each fault with its key, value and remedy."""
 
 import difflib
+import itertools
 from collections.abc import Iterator
 
 from jsonschema import Draft202012Validator, ValidationError
@@ -93,6 +94,8 @@ def is_told(error: ValidationError) -> bool:
     to it is given."""
     if error.validator == "additionalProperties":
         return True
+    if error.validator == "anyOf" and not inner_faults(error):
+        return any(one.validator == "additionalProperties" for one in error.context)
     if error.validator != "required":
         return False
     known = error.schema["properties"]
@@ -106,7 +109,7 @@ def fault_words(error: ValidationError) -> str:
     given = "empty" if value is None else repr(value)
     match error.validator:
         case "anyOf":
-            inner = [one for one in error.context if one.path or one.validator not in KIND_RULES]
+            inner = inner_faults(error)
             if inner:
                 return fault_words(inner[0])
             words = alternatives(word for option in limit for word in option_words(option))
@@ -141,13 +144,23 @@ def place(error: ValidationError) -> list:
 
 
 def key_of(error: ValidationError) -> str:
-    """The place of an error in the configuration: `scans.states.0`."""
-    return ".".join(map(str, error.absolute_path)) or "the configuration"
+    """The place of an error in the configuration: `scans.states[0]`."""
+    parts = [f"[{key}]" if isinstance(key, int) else f".{key}" for key in error.absolute_path]
+    return "".join(parts).removeprefix(".") or "the configuration"
 
 
 def listed(values) -> str:
     """Values as a configuration has them."""
     return ", ".join(map(str, values))
+
+
+def inner_faults(error: ValidationError) -> list[ValidationError]:
+    """What is wrong within the one of several kinds of value that there is, but for unknown keys."""
+    return [
+        one
+        for one in error.context
+        if one.validator != "additionalProperties" and (one.path or one.validator not in KIND_RULES)
+    ]
 
 
 def option_words(option: dict) -> list[str]:
@@ -175,6 +188,7 @@ def pair_faults(config: dict) -> list[str]:
     checks = (
         settings.case_kind,
         check_own_case,
+        check_twin,
         check_porosity,
         check_region,
         check_platens,
@@ -200,6 +214,30 @@ def check_own_case(config: dict) -> None:
         raise ConfigError(
             f"`case` is {fault}: give your scans a case of their own, such as `case: mine` "
             "(results go to results/mine)"
+        )
+
+
+def check_twin(config: dict) -> None:
+    """ConfigError where a twin has no struts to make: strains that do not grow, too dense a foam, cells
+    too large for its image."""
+    if settings.case_kind(config) != "twin":
+        return
+    twin = config.get("twin", {})
+    strains = twin.get("strains", [])
+    if any(later <= earlier for earlier, later in itertools.pairwise(strains)):
+        raise ConfigError(f"twin.strains is {strains}; they must increase from state to state")
+    porosity = config.get("porosity", 1)
+    if porosity < settings.TWIN_POROSITY:
+        raise ConfigError(
+            f"`porosity` is {porosity:g}; a twin has at least {settings.TWIN_POROSITY:g}, or its struts "
+            "would merge: try 0.9 to 0.98"
+        )
+    size, cell = twin.get("size", "default"), twin.get("cell_size", settings.NOMINAL_CELL)
+    most = min(settings.TWIN_SIZES[size]) / 2
+    if not settings.TWIN_CELL <= cell <= most:
+        raise ConfigError(
+            f"twin.cell_size is {cell:g}; {settings.TWIN_CELL:g} to {most:g} voxels are possible with "
+            f"size {size}"
         )
 
 

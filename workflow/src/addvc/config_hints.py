@@ -10,7 +10,11 @@ LIKELY_UM = (1, 200)
 
 def number_hint(value) -> str:
     """A guess where a text stands for a number: a comma in it, a per cent sign, a unit."""
-    found = re.fullmatch(r"\s*([-+]?\d+(?:[.,]\d+)?)\s*(\S*)\s*", value) if is_text(value) else None
+    if not is_text(value):
+        return ""
+    if re.fullmatch(r"[-+]?[\d.]+e[-+]?\d+", value):
+        return f" (write {float(value):g}: YAML takes {value} for a text)"
+    found = re.fullmatch(r"\s*([-+]?\d+(?:[.,]\d+)?)\s*(\S*)\s*", value)
     if not found:
         return ""
     number, unit = float(found[1].replace(",", ".")), found[2]

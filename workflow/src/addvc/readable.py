@@ -43,6 +43,8 @@ def fault(path: Path) -> str | None:
         return f"{path}: is not text in UTF-8: save it as plain text"
     except yaml.MarkedYAMLError as error:
         return f"{path}, {fault_words(error)}"
+    except (yaml.YAMLError, ValueError, OSError) as error:
+        return f"{path}: {' '.join(str(error).split())}"
     if not isinstance(given, dict):
         return f"{path}: has no `key: value` in it; see config/README.md"
     return None

@@ -48,7 +48,7 @@ def job(snakemake) -> Iterator[logging.Logger]:
     log = logging.getLogger("addvc")
     log.setLevel(logging.INFO)
     terminal = logging.StreamHandler(sys.stderr)
-    terminal.setLevel(os.environ.get("ADDVC_LOG", "INFO"))
+    terminal.setLevel(os.environ.get("ADDVC_LOG", "INFO").upper())
     handlers = [logging.FileHandler(path, mode="w"), terminal]
     for handler in handlers:
         handler.setFormatter(logging.Formatter(f"%(asctime)s [{name}] %(message)s", "%H:%M:%S"))

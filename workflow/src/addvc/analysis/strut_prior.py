@@ -4,8 +4,8 @@ Coefficients of a strut's motion are measured with a known covariance C. Over th
 coefficient is taken to be normal about zero, with a variance P that all measured ones tell (empirical
 Bayes [Efron1973]), and its deviation to go as one over the area A of a strut: struts share loads, and
 under a load thin ones stretch and bend more. The marginal likelihood of what was measured, with
-deviations as A^-p, is greatest for p = .5 to 1.75 (twist .7, bending 1.0 and 1.6 for the constant and
-the linear part, stretch .75, shear .4: means of three twins and states), never for 0.
+deviations as A^-p, is greatest for p = .7 (twist), 1.0 and 1.6 (bending, the constant and the linear
+part), .75 (stretch), .4 (shear): means of three twins and states; in none for 0.
 A strut then has the mean K c and the covariance P - K P, with K = P (P + C)^-1: what is measured well
 stays as it is, and what is noise is not taken for strain.
 """

@@ -162,8 +162,9 @@ def corotational(
         done += steps
         u = done[-1][0].u
     if ladder is not None and before:
-        problem, u, chosen, trials = with_cutoff(problem, deformed, u, last, ladder, mending)
-        done += chosen
+        choice = with_cutoff(problem, deformed, u, last, ladder, mending)
+        problem, u, trials = choice.problem, choice.u, choice.trials
+        done += choice.steps
     if mending is not None and before:
         problem = replace(problem, reference=trusted(problem.reference, deformed, u, mending))
     done.append(run(problem, last, deformed, u))
@@ -175,6 +176,17 @@ def corotational(
     return replace(solutions[-1], history=history, seconds=seconds), notes
 
 
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The problem with the l_E that was chosen, the u (n, 3) from there, the stages that it took, the
+    trials."""
+
+    problem: Problem
+    u: np.ndarray
+    steps: list[Step]
+    trials: list[dict]
+
+
 def with_cutoff(
     problem: Problem,
     deformed: np.ndarray,
@@ -182,32 +194,33 @@ def with_cutoff(
     last: Stage,
     ladder: Ladder,
     mending: Mending | None = None,
-) -> tuple[Problem, np.ndarray, list[Step], list[dict]]:
-    """The problem with the l_E of least risk, u (n, 3), the stages that it took (like the `last`, but
-    ended early), the trials.
+) -> Choice:
+    """The l_E of least risk, from u (n, 3), by stages like the `last` that are ended early.
 
     One linear step from u tells the risk only so far: from far off a stage is run with the new l_E, and
-    the choice made again. A stage that is not finite leaves l_E as it is. What is in doubt does not
+    the choice made again. A stage that is not finite leaves l_E as it was. What is in doubt does not
     count where it is mended: a few lost struts ask for an l_E that lets them lie anywhere (two twins at
     28.5 %, with them / without: 10 / 15 voxels)."""
-    done, rung, trials = [], 0, []
     stage = replace(last, stop=early(last.stop))
-    while True:
-        system = stage_system(problem, stage, u)
-        if rung != 0:
-            done.append(run(problem, stage, deformed, u, "l_E", system))
-            if not np.isfinite(done[-1][0].history[-1]):
-                return problem, u, done, trials
-            u = done[-1][0].u
+    found, rung, wanted = Choice(problem, u, [], []), 0, problem
+    for number in range(ROUNDS + 1):
+        system = stage_system(wanted, stage, found.u)
+        if number > 0:
+            step = run(wanted, stage, deformed, found.u, "l_E", system)
+            if not np.isfinite(step[0].history[-1]):
+                return found
+            found = replace(found, problem=wanted, u=step[0].u, steps=[*found.steps, step])
         if mending is not None:
-            system = replace(system, reference=trusted(system.reference, deformed, u, mending))
-        best, trials = least_risk(trial_of(system, deformed, u, ladder), ladder, rung)
-        trials = [row | {"l_e": row["times"] * problem.cutoff} for row in trials]
-        problem = problem.cut_off(RATIO ** (best - rung))
-        log.info("micro DVC: least risk at l_E = %.3g voxels", problem.cutoff)
-        if abs(best - rung) <= FAR or len(done) == ROUNDS:
-            return problem, u, done, trials
+            left = trusted(system.reference, deformed, found.u, mending)
+            system = replace(system, reference=left)
+        best, trials = least_risk(trial_of(system, deformed, found.u, ladder), ladder, rung)
+        found = replace(found, trials=[t | {"l_e": t["times"] * wanted.cutoff} for t in trials])
+        wanted = wanted.cut_off(RATIO ** (best - rung))
+        log.info("micro DVC: least risk at l_E = %.3g voxels", wanted.cutoff)
+        if abs(best - rung) <= FAR:
+            break
         rung = best
+    return replace(found, problem=wanted)
 
 
 def run(

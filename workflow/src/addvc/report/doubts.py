@@ -165,8 +165,8 @@ def flag_warnings(state: dict) -> list[str]:
         return []
     return [
         f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
-        "flagged: broken by the threshold, not measured, or on nodes in doubt. What is said of "
-        "bending leaves them out; the scene shows where they are."
+        "flagged: broken by the threshold, not measured, far from equilibrium or on nodes in doubt. "
+        "What is said of bending leaves them out; the scene shows where they are."
     ]
 
 

@@ -139,7 +139,7 @@ def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
     return {
         "Matching functional": "Eq. 2" if options.cutoff == 0 else "Eq. 9 with T = L",
         "Regularisation length (voxels)": f"l_L = {span(case.cutoffs(name) or [options.cutoff], '.3g')}",
-        "Initialisation": "coarse to fine" if coarsest else f"solution of {before}",
+        "Initialisation": "coarse to fine" if coarsest else _starts(before, config),
     }
 
 
@@ -154,15 +154,16 @@ def _micro(case: Case, config: dict, name: str, method: str) -> dict[str, str]:
     return {
         "Matching functional": functional,
         "Regularisation length (voxels)": lengths,
-        "Initialisation": _micro_start(case, config),
+        "Initialisation": _starts(case.finest, config),
     }
 
 
-def _micro_start(case: Case, config: dict) -> str:
-    """The starts that micro DVC chooses from."""
-    if "freeform" not in config["meso"]["candidates"]:
-        return f"solution of {case.finest}"
-    return f"solution of {case.finest} or free-form, by state (more_starts.csv)"
+def _starts(before: str, config: dict) -> str:
+    """The starts that a mesh chooses from: the solution of the one before, and candidates."""
+    fields = [name for name in config["meso"]["candidates"] if name not in ("zero", "platens")]
+    if not fields:
+        return f"solution of {before}"
+    return f"solution of {before} or {', '.join(fields)}, by state (more_starts.csv)"
 
 
 def _ultimate(case: Case, name: str, key: str) -> str:

@@ -51,7 +51,8 @@ def closing_lines(summary: dict, folder: str) -> str:
 
 
 def flag_words(struts: dict | None) -> str:
-    """How many struts are flagged: doubtful, broken by the threshold, or not measured."""
+    """How many struts are flagged: doubtful, broken by the threshold, far from equilibrium, or not
+    measured."""
     if not struts:
         return ""
     return f", {struts['flagged']} of {struts['valid'] + struts['flagged']} struts flagged"

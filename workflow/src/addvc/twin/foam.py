@@ -9,6 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
+from addvc.errors import ConfigError
+
 from .options import Specimen, TwinOptions, specimen
 from .packing import MEAN_RADIUS, pack
 
@@ -189,7 +191,7 @@ def largest_component(skeleton: Skeleton) -> Skeleton:
     nodes, edges, kind = compact(skeleton.nodes, skeleton.edges[kept], skeleton.kind)
     for k, name in ((LOW, "lower"), (HIGH, "upper")):
         if np.sum(kind == k) < 3:
-            raise ValueError(
+            raise ConfigError(
                 f"only {np.sum(kind == k)} struts reach the {name} platen, at least 3 are needed; "
                 "choose another twin seed, a larger size or a smaller cell_size"
             )

@@ -8,15 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from addvc.config import TWIN_CELL, TWIN_POROSITY, TWIN_SIZES
 from addvc.errors import ConfigError
 
-SIZES = {
-    "tiny": (72, 84, 72),
-    "default": (120, 140, 120),
-    "mid": (200, 240, 200),
-    "paper": (504, 551, 507),
-}
-"""Shape (nx, ny, nz) of the binned image of each size, voxels."""
+SIZES = TWIN_SIZES
 
 DTYPES = ("uint8", "uint16", "float32")
 MATERIALS = ("elastic", "hinging")
@@ -97,8 +92,9 @@ class TwinOptions:
         yield self.dtype not in DTYPES, f"twin dtype {self.dtype!r} is none of {DTYPES}"
         yield self.bin < 1 or self.bin != int(self.bin), f"twin bin {self.bin} is no integer >= 1"
         yield (
-            not 0.85 <= self.porosity < 1,
-            f"porosity {self.porosity} is outside [0.85, 1), struts would merge; try 0.9 to 0.98",
+            not TWIN_POROSITY <= self.porosity < 1,
+            f"porosity {self.porosity} is outside [{TWIN_POROSITY}, 1), struts would merge; "
+            "try 0.9 to 0.98",
         )
         yield (
             not (np.all(np.diff(e) > 0) and e[-1] <= 0.5),
@@ -123,8 +119,9 @@ class TwinOptions:
             yield value < 0, f"{key} {value} is negative; 0 switches it off"
         size = min(SIZES.get(self.size, (1, 1, 1)))
         yield (
-            not 8 <= self.cell_size <= size / 2,
-            f"cell_size {self.cell_size} is outside [8, {size / 2}] voxels for size {self.size!r}",
+            not TWIN_CELL <= self.cell_size <= size / 2,
+            f"cell_size {self.cell_size} is outside [{TWIN_CELL:g}, {size / 2}] voxels for size "
+            f"{self.size!r}",
         )
 
 

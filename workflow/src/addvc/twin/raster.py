@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from addvc.errors import ConfigError
+
 from . import kernels
 from .geometry import beams, bend, bounds, cell_list
 from .motion import Motion, at_rest
@@ -89,7 +91,7 @@ def fit_radius(network: Network, fraction: float, tolerance: float = 0.003) -> N
             slope = np.clip((miss - previous[1]) / (log - previous[0]), 1.2, 2.5)
         previous = (log, miss)
         log = log - miss / slope
-    raise ValueError(
+    raise ConfigError(
         f"solid fraction {fraction:.4f} not reached (off by {miss:.1%} after 8 steps, limit "
         f"{tolerance:.1%}); choose a porosity nearer to 0.96"
     )
