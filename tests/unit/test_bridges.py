@@ -125,3 +125,12 @@ def test_a_coarser_lattice_has_thicker_rods():
     grey = broken(0.45)
     fine, coarse = (bridged(grey, grey, LEVELS, REGION, size)[1] for size in (1.2, 3.0))
     assert coarse[0]["radius"] >= 0.65 * 3.0 > fine[0]["radius"]
+
+
+def test_a_bridge_is_thinnest_where_the_image_is_faintest():
+    strut = rods([(LEFT, RIGHT)], faint(0.47, 27.5, 34.5))
+    strut[33] *= 0.93
+    grey = np.maximum(strut, rods(FEET + HELD))
+    (row,) = bridged(grey, grey, LEVELS, REGION, SIZE)[1]
+    assert row["position"] == pytest.approx([31, 20, 20], abs=0.5)
+    assert row["thinnest"] == pytest.approx([33, 20, 20], abs=1.1)

@@ -41,11 +41,13 @@ class Gap:
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """Rod around points (k, 3) of radii (k,), voxels, across a gap of this `length`."""
+    """Rod around points (k, 3) of radii (k,), voxels, across a gap of this `length`; the point, by
+    number, where the grey level says that it is thinnest."""
 
     points: np.ndarray
     radii: np.ndarray
     length: float
+    thinnest: int
 
 
 def bridged(
@@ -148,7 +150,8 @@ def bridge(struts: GreyStruts, gap: Gap, least: float) -> Bridge:
     inner = np.clip(s, curve.middle - curve.half, curve.middle + curve.half)
     area = sections_of(curve, inner, struts.solid.voxels[own], struts.solid.share[own])
     points = path(struts, gap.branch, curve, s, length)
-    return Bridge(points, np.maximum(np.sqrt(area / np.pi), least), gap.stop - gap.start)
+    radii = np.maximum(np.sqrt(area / np.pi), least)
+    return Bridge(points, radii, gap.stop - gap.start, int(area.argmin()))
 
 
 def path(struts: GreyStruts, number: int, curve: Curve, s: np.ndarray, length: float) -> np.ndarray:
@@ -177,16 +180,26 @@ def raise_rod(grey: np.ndarray, rod: Bridge, gamma: float, slope: float, most: f
     grey[box] = np.maximum(grey[box], inside)
 
 
+def direction(rod: Bridge) -> np.ndarray:
+    """Unit vector (3,) along a rod where it is thinnest, over its radius there."""
+    away = np.linalg.norm(rod.points - rod.points[rod.thinnest], axis=1)
+    near = np.flatnonzero(away <= max(rod.radii[rod.thinnest], np.sort(away)[1]))
+    vector = rod.points[near[-1]] - rod.points[near[0]]
+    return vector / max(np.linalg.norm(vector), 1e-12)
+
+
 def listed(bridges: list[Bridge]) -> list[dict]:
-    """The bridges as data, the longest first; `direction`: the unit vector along them."""
-    ends = [one.points[-1] - one.points[0] for one in bridges]
+    """The bridges as data, the longest first; `thinnest`: where they are, `direction`: the unit vector
+    along them there."""
+    along = [direction(one) for one in bridges]
     rows = [
         {
             "position": one.points[len(one.points) // 2].tolist(),
-            "direction": (end / max(np.linalg.norm(end), 1e-12)).tolist(),
+            "thinnest": one.points[one.thinnest].tolist(),
+            "direction": there.tolist(),
             "length": one.length,
             "radius": float(one.radii.mean()),
         }
-        for one, end in zip(bridges, ends, strict=True)
+        for one, there in zip(bridges, along, strict=True)
     ]
     return sorted(rows, key=lambda row: -row["length"])
