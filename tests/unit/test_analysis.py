@@ -285,7 +285,7 @@ def test_costs_add_up_over_the_jobs_of_a_rule(tmp_path):
     for name, row in rows.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(HEAD + row)
-    assert costs(tmp_path, ["scene"]) == {
+    assert costs(tmp_path, ["scene"], [1, 2], ["meso12", "micro"]) == {
         "meso_dvc": {"jobs": 2, "cpu_s": 9.0, "wall_s": 10.0, "max_rss_mb": 300.5},
         "summary": {"jobs": 1, "cpu_s": 0.0, "wall_s": 0.4, "max_rss_mb": 0.0},
     }
@@ -295,4 +295,15 @@ def test_a_benchmark_that_is_being_written_is_no_error(tmp_path):
     (tmp_path / "smooth").mkdir()
     (tmp_path / "smooth/state1.tsv").write_text("")
     (tmp_path / "smooth/state2.tsv").write_text(HEAD)
-    assert costs(tmp_path) == {}
+    assert costs(tmp_path, [], [], []) == {}
+
+
+def test_costs_leave_out_what_earlier_configurations_made(tmp_path):
+    names = ["micro_state1", "micro-eq10_state1", "micro_state2", "all"]
+    for name in names:
+        (tmp_path / "micro_dvc").mkdir(exist_ok=True)
+        (tmp_path / f"micro_dvc/{name}.tsv").write_text("s\tcpu_time\tmax_rss\n2\t1\t3\n")
+    jobs = lambda *given: costs(tmp_path, [], *given)["micro_dvc"]["jobs"]  # noqa: E731
+    assert jobs([1, 2], ["micro", "micro-eq10"]) == 4
+    assert jobs([1], ["micro", "micro-eq10"]) == 3
+    assert jobs([1], ["micro"]) == 2

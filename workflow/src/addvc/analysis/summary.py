@@ -2,7 +2,8 @@
 
 import csv
 import platform
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -64,7 +65,7 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
             {"state": state, "label": label} | state_figures(folder, state, scope)
             for state, label in states.items()
         ],
-        "cost": costs(folder / "benchmarks", scope.apart),
+        "cost": costs(folder / "benchmarks", scope.apart, states, scope.meshes),
         "versions": {"addvc": __version__, "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
     }
@@ -167,11 +168,13 @@ def compression(position: np.ndarray, displacement: np.ndarray) -> float:
     return float(closer / (np.median(position[top]) - np.median(position[bottom])))
 
 
-def costs(folder: Path, apart: Sequence[str] = ()) -> dict:
+def costs(folder: Path, apart: Sequence[str], states: Iterable[int], meshes: Sequence[str]) -> dict:
     """CPU seconds, wall seconds and peak memory of each rule, over its jobs, from benchmarks.
 
-    Figures and the rules `apart` are left out: they may run while this is read."""
+    Figures and the rules `apart` are left out, since they may run while this is read, and what earlier
+    configurations have left: benchmarks of other states and meshes."""
     result: dict[str, dict] = {}
+    wanted = {"0", *map(str, states)}
     for path in sorted(set(folder.rglob("*.tsv")) - set(folder.glob("figures/*"))):
         with path.open() as file:
             row = next(csv.DictReader(file, delimiter="\t"), None)
@@ -179,7 +182,9 @@ def costs(folder: Path, apart: Sequence[str] = ()) -> dict:
             continue
         number = {key: _number(row.get(key)) for key in ("cpu_time", "s", "max_rss")}
         rule = path.relative_to(folder).parts[0]
-        if rule in apart:
+        named = re.fullmatch(r"((?:meso|micro)[^_]*)(?:_state\d+)?", path.stem)
+        numbers = re.findall(r"state(\d+)", path.stem)
+        if rule in apart or not wanted.issuperset(numbers) or (named and named[1] not in meshes):
             continue
         entry = result.setdefault(rule, {"jobs": 0, "cpu_s": 0.0, "wall_s": 0.0, "max_rss_mb": 0.0})
         entry["jobs"] += 1
