@@ -17,8 +17,8 @@ The search climbs a ladder of l_E, then goes down it, as long as the risk falls:
 linear step from a u that a stage has found, with conjugate gradients preconditioned by its factor.
 
 On the default twin, rms error in voxels with l_E = 0.8 cell size in all states and with the one
-chosen: .088 / .071, .092 / .080, .109 / .107 at 3.4, 5.2, 12.3 % (l_E of 52, 52 and 35 voxels); where
-every strut moves on its own (benchmarks, `strut`) .544 / .419 (3 voxels).
+chosen: .090 / .069, .093 / .076, .109 / .103 at 3.4, 5.2, 12.3 % (l_E of 52, 52 and 35 voxels); where
+every strut moves on its own (benchmarks, `strut`) .544 / .423 (3 voxels).
 """
 
 import logging
