@@ -68,7 +68,7 @@ def maps(fig: Figure, case: Case, grids: dict, figures: dict, way: tuple[int, in
         part = part if axis < flat else part.T  # rows along the loading axis
         draw_map(ax, part, lines[flat], lines[axis])
         band_line(ax, figures[state], (flat, axis, normal), lines)
-        ax.set(xlabel=f"{style.AXES[flat]} (voxels)\n{band_words(figures[state])}")
+        ax.set_xlabel(f"{style.AXES[flat]} (voxels)\n{band_words(figures[state])}", fontsize=7)
         ax.set(ylabel=f"{style.AXES[axis]} (voxels), loading" if number % width == 0 else "")
         title = case.title(state, case.micro[0]).replace(": ", ":\n").replace(", ", ",\n")
         style.headline(ax, title, number)
@@ -109,12 +109,12 @@ def band_line(ax: Axes, band: dict, way: tuple[int, int, int], lines: list[np.nd
 def band_words(band: dict) -> str:
     """What the largest band holds, how thick and how tilted it is."""
     if not band["bands"]:
-        return "no band\n\n\n\n"
+        return "no band\n\n\n\n\n"
     tilt = "a lump" if band["flatness"] >= LUMP else f"{band['angle']:.0f}° in space"
     return (
         f"largest band: {band['band_volume_share']:.0%}\nof the volume, "
         f"{band['band_strain_share']:.0%}\nof the compression,\n"
-        f"{band['thickness']:.0f} voxels, {tilt}"
+        f"{band['thickness']:.0f} voxels thick,\n{tilt}"
     )
 
 

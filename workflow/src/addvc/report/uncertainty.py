@@ -27,7 +27,7 @@ def uncertainty(case: Case, outputs: Iterable[str], truth: bool) -> None:
     _map(left, case, nodes, f"{case.micro[0]}, {case.labels[state]}")
     panels = right.subplots(2 if truth else 1, 1, squeeze=False)[:, 0]
     _by_radius(panels[0], load_partition(case.path("geometry/struts.h5"))[0], struts)
-    style.headline(panels[0], "of the struts", 1)
+    style.headline(panels[0], "uncertainty of the struts", 1)
     if truth:
         _calibration(panels[1], case)
         style.headline(panels[1], "errors of the nodes", 2)
@@ -47,10 +47,10 @@ def _map(fig, case: Case, nodes: np.ndarray, title: str) -> None:
     layer = Layer(mesh.points, boundary(mesh)[0], values=nodes, norm=norm, cmap=style.MAGNITUDE)
     ax = fig.subplots()
     render([layer], view, 85).show(ax)
-    style.headline(ax, f"of the nodes, {title}", 0)
+    style.headline(ax, f"uncertainty, {title}", 0)
     style.scale_bar(ax, case.voxel_um, 0.4)
     style.axis_arrows(ax, view.right, view.up)
-    label = f"standard uncertainty ({style.voxels(case.voxel_um)})"
+    label = f"standard uncertainty of a node ({style.voxels(case.voxel_um)})"
     place = {"location": "bottom", "shrink": 0.8, "aspect": 30}
     style.colour_bar(fig, ax, norm, style.MAGNITUDE, label, **place)
 
