@@ -43,6 +43,9 @@ TARGETS = "A target is `ablation`, `sensitivity` or a file below results/CASE: s
 STOPPING = "Terminating processes on user request"
 """How Snakemake answers Ctrl-C."""
 
+ENDS = "Exiting because a job execution failed"
+"""What Snakemake says at the end, when each of these jobs has been told."""
+
 ENDING = "Will exit after finishing"
 """How Snakemake answers kill."""
 
@@ -127,7 +130,7 @@ class LogHandler(LogHandlerBase):
     def tell_error(self, record: LogRecord, event: LogEvent | None) -> None:
         """An error, once: of a job what it has left in its log."""
         message = str(record.msg)
-        if "At least one job did not complete" in message:
+        if message.startswith(ENDS) or "At least one job did not complete" in message:
             return
         if event == LogEvent.JOB_ERROR and record.log:
             said = (
