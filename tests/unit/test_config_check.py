@@ -157,6 +157,11 @@ def test_a_misspelt_key_that_is_needed_is_told_once():
     assert "is missing" not in str(told.value)
 
 
+def test_pairs_are_told_beside_wrong_values_as_far_as_they_can_be():
+    with pytest.raises(ConfigError, match=r"^2 things are wrong:[\s\S]*platens is \[130, 10\]"):
+        check_config(own(porosity="0,96", **scans(platens=[130, 10])), SCHEMA)
+
+
 def test_every_missing_key_and_a_section_left_empty_are_told():
     with pytest.raises(ConfigError, match=r"reference` is missing[\s\S]*voxel_size_um` is missing"):
         check_config(own(scans={}), SCHEMA)
@@ -170,6 +175,9 @@ def test_a_right_configuration_passes():
 
 
 def test_what_may_be_forgotten_is_warned_of():
+    (warning,) = check_config({"case": "mine", "porosity": 0.96}, SCHEMA)
+    assert "neither `scans` nor `twin`" in warning and "as case mine" in warning
+    assert check_config({"case": "other", "twin": {"seed": 2418}}, SCHEMA) == []
     (warning,) = check_config(own(**scans(states=[])), SCHEMA)
     assert "scans.states is empty" in warning
     (warning,) = check_config(own(loading_axis=None), SCHEMA)

@@ -201,7 +201,7 @@ def test_missing_system_packages_are_asked_for_in_one_command(copy):
     "words, given",
     [
         ("", "--cores all"),
-        ("-n results/a", "--cores all --nolock -n results/a"),
+        ("-n results/a", "--cores all -n results/a"),
         ("--config cores=3", "--cores all --config cores=3"),
         ("--cores 2", "--cores 2"),
         ("-c2", "-c2"),

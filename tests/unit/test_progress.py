@@ -202,6 +202,7 @@ def test_what_a_job_says_goes_to_its_log_and_by_choice_to_the_terminal(
         ("scans:\n   bin: 1\n  crop: null\n", r"bad.yaml, line 3: .*the indentation does not fit"),
         ("scans: {bin: 1\n", r"bad.yaml, lines 1 to 2: .*a bracket is opened and not closed"),
         ("scans:\n  bin: 1\n  bin: 2\n", r"bad.yaml, lines 2 to 3: `bin` is given twice: keep one"),
+        ('a: "C:\\scans"\n', r"bad.yaml, line.* a backslash in double quotes: write /"),
         ("a: b\x01\n", r"bad.yaml: unacceptable character"),
         ("a: 2026-13-45\n", r"bad.yaml: month must be in"),
         ("", r"bad.yaml: has no `key: value` in it"),

@@ -172,9 +172,10 @@ def test_sigma_of_noise_alone_stands_beside_that_of_the_residual():
 def test_closing_lines_tell_the_verdict_of_each_state(one, words):
     lines = closing_lines(summary(GOOD, one), "results/foam").splitlines()
     assert lines[0] == "addvc: case foam-2_b is done; results are in results/foam/"
-    assert len(lines) == 4
+    assert ("on the first page" in lines[-2]) == (warnings(summary(GOOD, one)) != ["None."])
+    assert len(lines) == 4 + ("on the first page" in lines[-2])
     assert words in lines[2]
-    assert lines[3].endswith("results/foam/report.html")
+    assert lines[-1].endswith("results/foam/report.html")
 
 
 def test_closing_lines_tell_how_many_struts_are_flagged():

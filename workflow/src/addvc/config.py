@@ -3,6 +3,7 @@
 import glob
 import hashlib
 import json
+import re
 from pathlib import Path
 
 from addvc.errors import ConfigError
@@ -180,8 +181,10 @@ def scan_files(path: str) -> list[str]:
     slices = [file for file in place.glob("[!.]*") if file.suffix.lower() in (".tif", ".tiff")]
     found = sorted(map(str, slices)) if place.is_dir() else sorted(glob.glob(path))
     if not found:
+        hint = "curly quotes around it? " if re.search("[\u2018-\u201f]", path) else ""
+        hint += "write the whole path in place of ~: " if path.startswith("~") else ""
         raise ConfigError(
-            f"scan {path} was not found (0 files; at least 1); paths start at {Path.cwd()}: correct "
-            "scans.reference or scans.states"
+            f"scan {path} was not found (0 files; at least 1); {hint}paths start at {Path.cwd()}: "
+            "correct scans.reference or scans.states"
         )
     return found

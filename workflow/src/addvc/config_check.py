@@ -37,9 +37,10 @@ LEAST_POROSITY = 0.3
 def check_config(config: dict, schema: dict) -> list[str]:
     """Warnings about a configuration as the user gave it, without defaults.
 
-    Raises ConfigError with every unknown key and every value the schema does not allow; where there is
-    none, with every pair of values that do not go together; and with the scans that are not there."""
-    faults = [*key_faults(config, schema), *value_faults(config, schema)] or pair_faults(config)
+    Raises ConfigError with every unknown key, every value the schema does not allow, every pair of
+    values that do not go together and the scans that are not there."""
+    faults = [*key_faults(config, schema), *value_faults(config, schema)]
+    faults += pair_faults(config, told=bool(faults))
     if faults:
         refuse([*faults, *missing_scans(config)])
     return given_warnings(config)
@@ -182,8 +183,9 @@ def meaning(error: ValidationError, schema: dict) -> str:
     return words
 
 
-def pair_faults(config: dict) -> list[str]:
-    """What does not go together in a configuration whose values are each right."""
+def pair_faults(config: dict, told: bool = False) -> list[str]:
+    """What does not go together in a configuration whose values are each right; where some are not, and
+    `told`, as far as it can be said."""
     faults = []
     checks = (
         settings.case_kind,
@@ -200,6 +202,9 @@ def pair_faults(config: dict) -> list[str]:
             check(config)
         except ConfigError as error:
             faults.append(str(error))
+        except (TypeError, KeyError, AttributeError, ValueError):  # of a value that is told
+            if not told:
+                raise
     return list(dict.fromkeys(faults))
 
 
@@ -302,9 +307,13 @@ def missing_scans(config: dict) -> list[str]:
 
 
 def given_warnings(config: dict) -> list[str]:
-    """Warnings about real scans."""
+    """Warnings about real scans, and about a configuration that seems to lack them."""
     if "scans" not in config:
-        return []
+        lacks = config.get("case", settings.DEMO) != settings.DEMO and "twin" not in config
+        words = (
+            "there is neither `scans` nor `twin`: the default synthetic twin will be made as case"
+        )
+        return [f"{words} {config['case']}"] if lacks else []
     found = []
     if settings.case_kind(config) == "scans" and not config["scans"].get("states"):
         found.append(

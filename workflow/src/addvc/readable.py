@@ -15,6 +15,7 @@ MEANT = {  # beginnings of what the YAML parser says
     "could not find expected ':'": "a colon and a space are needed between key and value",
     "found unexpected end of stream": UNCLOSED,
     "expected ',' or": UNCLOSED,
+    "found unknown escape": "a backslash in double quotes: write /, or use single quotes",
     "found character '\\t'": "a tab: indent with spaces",
 }
 

@@ -27,9 +27,12 @@ ROUTINE = (  # beginnings of messages that have no event and tell the user nothi
     "Conda environments",
     "Execute ",
     "Provided ",
+    "Reasons:",
     "Rules claiming",
     "Select jobs",
+    "Rules with provenance",
     "Shutting down",
+    "Some jobs were triggered",
     "Using shell",
     "Using workflow specific",
 )
@@ -42,6 +45,9 @@ TARGETS = "A target is `ablation`, `sensitivity` or a file below results/CASE: s
 
 STOPPING = "Terminating processes on user request"
 """How Snakemake answers Ctrl-C."""
+
+LOCKED = "Directory cannot be locked"
+"""What Snakemake says of a lock; a dry run goes on all the same."""
 
 ENDS = "Exiting because a job execution failed"
 """What Snakemake says at the end, when each of these jobs has been told."""
@@ -97,7 +103,9 @@ class LogHandler(LogHandlerBase):
         event = getattr(record, "event", None)
         if self.stopped:
             return
-        if str(record.msg).startswith(STOPPING):
+        if LOCKED in str(record.msg) and self.common_settings.dryrun:
+            print("A run is at work in this folder. Left to do:", file=self.terminal.stream)
+        elif str(record.msg).startswith(STOPPING):
             self.stopped = True
             self.say("interrupted: what was done is kept, the same command goes on from there")
         elif record.levelno >= ERROR:

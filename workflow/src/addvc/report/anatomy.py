@@ -64,7 +64,8 @@ def meso_meshes(case: Case, outputs: Iterable[str]) -> None:
         style.headline(ax, name, panel)
         counts = f"{facts['nodes']:,} nodes\n{facts['cells']:,} tetrahedra"
         style.note(ax, f"mean edge {facts['mean_edge']:.1f} voxels\n{counts}", y=-0.03)
-    style.axis_arrows(axes[0, -1], view.right, view.up)
+    style.scale_bar(axes[0, 0], case.voxel_um, 0.4, y=-0.3)
+    style.axis_arrows(axes[0, -1], view.right, view.up, y=-0.3)
     style.save(fig, outputs)
 
 

@@ -18,7 +18,7 @@ from addvc.report.scene import Layer, aspect, oblique, render
 
 BINS = np.linspace(0, 1, 21)
 COMPARED = ("bending_share", "axial_strain")
-GREY = "#9a9a9a"
+GREY, NO_VALUE = "#9a9a9a", "#e6d5a0"
 PALE = (1.0, 0.45, 0.15)
 """How full the colours of bending, stretching and torsion are."""
 
@@ -28,7 +28,8 @@ TRUTHS = ("_beams", "_field")
 
 def network(case: Case, outputs: Iterable[str]) -> None:
     """Every strut in the reference, micro beside meso: (top) share of bending, (bottom) axial strain,
-    of the last state that was found; struts that cannot be trusted are magenta."""
+    of the last state that was found; struts that cannot be trusted are magenta, those
+    without a value sand."""
     state, view = case.shown_state(), oblique(case.specimen.axis)
     struts, junctions = load_partition(case.path("geometry/struts.h5"))
     table = read_columns(case.path(f"struts_state{state}.csv"))
@@ -44,10 +45,12 @@ def network(case: Case, outputs: Iterable[str]) -> None:
         cmap = style.MAGNITUDE if row == 0 else style.SIGNED
         for panel, (name, suffix) in enumerate(sources.items()):
             values = np.where(valid, table[column + suffix], np.nan)[owner]
-            known = np.isfinite(values) & (owner != FREE_END)
+            trusted = valid[owner] & (owner != FREE_END)
+            known = np.isfinite(values) & trusted
             layers = [
                 Layer(points, faces[known], values=values[known], norm=norm, cmap=cmap),
-                Layer(points, faces[~known & (owner != FREE_END)], colour=style.DOUBT),
+                Layer(points, faces[~trusted & (owner != FREE_END)], colour=style.DOUBT),
+                Layer(points, faces[trusted & ~known], colour=NO_VALUE),
                 Layer(points, faces[owner == FREE_END], colour=GREY),
             ]
             render(layers, view, style.WIDTH / 2, points, shadows=True).show(ax[panel])
@@ -59,9 +62,10 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     style.axis_arrows(axes[1, 1], view.right, view.up)
     handles = [
         Patch(color=style.DOUBT, label="in doubt"),
+        Patch(color=NO_VALUE, label="no value"),
         Patch(color=GREY, label="junction"),
     ]
-    fig.legend(handles=handles, loc="outside lower center", ncols=2)
+    fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
 
 

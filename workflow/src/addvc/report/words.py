@@ -46,6 +46,11 @@ def closing_lines(summary: dict, folder: str) -> str:
     if failed:
         count = f"{len(failed)} of {summary['twin_checks']['count']}"
         lines.append(f"  {count} checks of the synthetic test do not hold: see the report")
+    told = [line for line in warnings(summary) if line != "None."]
+    if told:
+        lines.append(
+            f"  {len(told)} warning{'s' * (len(told) > 1)} on the first page of the report"
+        )
     lines.append(f"  open the report: xdg-open {folder}/report.html")
     return "\n".join(lines)
 
