@@ -9,8 +9,16 @@ import numpy as np
 
 from addvc import config as settings
 from addvc.analysis.truth import Judge, load_truth
-from addvc.correlation.corotational import Problem, corotational
-from addvc.correlation.micro import elastic, ladder, mending, micro_options, micro_reference, stages
+from addvc.correlation.corotational import corotational
+from addvc.correlation.micro import (
+    elastic,
+    ladder,
+    mending,
+    micro_options,
+    micro_reference,
+    problem_of,
+    stages,
+)
 from addvc.correlation.store import load_field, load_order
 from addvc.errors import AddvcError
 from addvc.fem.io import read_mesh, read_vtu
@@ -98,7 +106,8 @@ def micro_with(folder: Path, config: dict, state: int, changes: dict) -> tuple[n
     )
     _, _, weights = elastic(reference, micro_options(micro, cell, settings.loading_axis(config)))
     order, _ = load_order(folder / "dvc/micro_factor.h5")
-    problem = Problem(reference, weights["c"], micro["nu"], weights["l_e"], order)
+    bridges = read_json(folder / "geometry/bridges.json")
+    problem = problem_of(reference, weights, micro["nu"], order, bridges)
     u = load_field(folder / f"dvc/micro_start_state{state}.h5")
     plan = stages(micro, levels), mending(micro, levels)
     cutoffs = ladder(micro, levels, config["images"]["blur"], "corotational")

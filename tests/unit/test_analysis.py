@@ -299,7 +299,7 @@ def test_a_benchmark_that_is_being_written_is_no_error(tmp_path):
 
 
 def test_costs_leave_out_what_earlier_configurations_made(tmp_path):
-    names = ["micro_state1", "micro-eq10_state1", "micro_state2", "all"]
+    names = ["micro_state1", "micro-eq10_state1", "micro_state2", "all", "micro-without_shell"]
     for name in names:
         (tmp_path / "micro_dvc").mkdir(exist_ok=True)
         (tmp_path / f"micro_dvc/{name}.tsv").write_text("s\tcpu_time\tmax_rss\n2\t1\t3\n")

@@ -304,10 +304,12 @@ def test_a_second_run_is_refused_even_where_the_lock_is_gone(ready):
     with subprocess.Popen(words, cwd=ready.folder) as live:
         refused, calls = ready("run", "-c1")
         looked, _ = ready("run", "-c1", "-n")
+        at_work = [ready("run", words)[0] for words in ("-Rmicro_mesh", "-k", "-F")]
         shown = [ready("run", words)[0] for words in ("-pn", "--help", "--dag", "--dry-run")]
         live.terminate()
     assert refused.returncode == 1 and "another clone can run beside it" in refused.stderr
     assert not any("at work" in one.stderr for one in shown)
+    assert all("at work" in one.stderr for one in at_work)
     assert not calls and "at work" not in looked.stderr
 
 

@@ -64,9 +64,21 @@ def test_a_line_for_each_job_and_all_of_the_log_in_the_file(snakemake, tmp_path)
 def test_a_failed_job_is_told_in_full_and_the_status_stays(snakemake, tmp_path):
     status, said = snakemake("--keep-going", "--show-failed-logs")
     assert status == 1
-    assert "FAILED: bad: see above and bad.log" in said
+    assert "FAILED: bad: no error of addvc's in bad.log, which ends with:" in said
+    assert "the value, the limit and the remedy" in said
     assert len(re.findall(r"of 4 steps", said)) == 2, "the others are made"
     assert "Error in rule bad" in full_log(tmp_path)
+
+
+def test_a_job_that_is_killed_is_told_with_the_signal(snakemake, tmp_path):
+    (tmp_path / "Snakefile").write_text(
+        "rule all:\n    input: 'a'\n"
+        "rule one:\n    output: 'a'\n    log: 'one.log'\n    script: 'one.py'\n"
+    )
+    (tmp_path / "one.py").write_text("import os\nos.kill(os.getpid(), 9)\n")
+    status, said = snakemake()
+    assert status == 1 and "FAILED: one: before it could write one.log" in said
+    assert "a job was killed by SIGKILL" in said
 
 
 def test_what_is_wrong_before_any_job_is_told(snakemake, tmp_path):

@@ -83,7 +83,10 @@ def test_a_cut_goes_across_one_strut_and_nothing_else(bridged):
     assert np.linalg.norm(middle - MIDDLE, axis=1).max() < 1.4 + 2.0
     nodes = np.unique(mesh.cells[joint.layer])
     assert sorted(np.concatenate(joint.sides)) == nodes.tolist()
-    assert apart(joint, side(mesh.points) * SLIP) == pytest.approx(6.0)
+    gap = np.linalg.norm(joint.offset)
+    assert apart(joint, side(mesh.points) * SLIP) == pytest.approx(np.hypot(6, gap) - gap, abs=0.2)
+    turn = Rotation.from_rotvec([0.3, 0.5, -1.0]).as_matrix() - np.eye(3)
+    assert apart(joint, (mesh.points - MIDDLE) @ turn.T) == pytest.approx(0.0, abs=1e-9)
     assert apart(joint, np.ones_like(mesh.points)) == pytest.approx(0.0)
     q = bridged.tear([joint]).reference.quadrature
     assert ((q.weight == 0) == joint.layer[q.cell]).all()

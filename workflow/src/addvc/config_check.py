@@ -38,7 +38,7 @@ def check_config(config: dict, schema: dict) -> list[str]:
     """Warnings about a configuration as the user gave it, without defaults.
 
     Raises ConfigError with every unknown key, every value the schema does not allow, every pair of
-    values that do not go together and the scans that are not there."""
+    values that do not go together and, beside any of these, the scans that are not there."""
     faults = [*key_faults(config, schema), *value_faults(config, schema)]
     faults += pair_faults(config, told=bool(faults))
     if faults:
@@ -114,13 +114,15 @@ def fault_words(error: ValidationError) -> str:
             if inner:
                 return fault_words(inner[0])
             words = alternatives(word for option in limit for word in option_words(option))
-            return f"`{key}` is {given}; it must be {words}{number_hint(value)}"
+            number = any(option.get("type") == "number" for option in limit)
+            return f"`{key}` is {given}; it must be {words}{number_hint(value) if number else ''}"
         case "required":
             return f"`{'.'.join(map(str, place(error)))}` is missing"
         case "type":
             kinds = [limit] if isinstance(limit, str) else limit
             words = alternatives(KINDS.get(kind, "null") for kind in kinds)
-            hint = list_hint(value, error.schema) if "array" in kinds else number_hint(value)
+            hint = list_hint(value, error.schema) if "array" in kinds else ""
+            hint = number_hint(value) if {"number", "integer"} & set(kinds) else hint
             return f"`{key}` is {given}; it must be {words}{hint}"
         case "enum":
             near = nearest(str(value), limit)
@@ -202,7 +204,7 @@ def pair_faults(config: dict, told: bool = False) -> list[str]:
             check(config)
         except ConfigError as error:
             faults.append(str(error))
-        except (TypeError, KeyError, AttributeError, ValueError):  # of a value that is told
+        except (TypeError, LookupError, AttributeError, ValueError):  # of a value that is told
             if not told:
                 raise
     return list(dict.fromkeys(faults))

@@ -12,16 +12,16 @@ def number_hint(value) -> str:
     """A guess where a text stands for a number: a comma in it, a per cent sign, a unit."""
     if not is_text(value):
         return ""
-    if re.fullmatch(r"[-+]?[\d.]+e[-+]?\d+", value):
+    if re.fullmatch(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+", value):
         return f" (write {float(value):g}: YAML takes {value} for a text)"
-    found = re.fullmatch(r"\s*([-+]?\d+(?:[.,]\d+)?)\s*(\S*)\s*", value)
+    found = re.fullmatch(r"\s*([-+]?\d+(?:[.,]\d+)?)\s*([^\d.,\s]\S*|)\s*", value)
     if not found:
         return ""
     number, unit = float(found[1].replace(",", ".")), found[2]
     if unit == "%":
         return f" (did you mean {number / 100:g}?)"
-    alone = " without its unit" if unit else " with a dot and without quotes"
-    return f" (write {number:g},{alone})"
+    how = "its unit" if unit else "a comma" if "," in found[1] else "quotes"
+    return f" (write {number:g}, without {how})"
 
 
 def list_hint(value, schema: dict) -> str:

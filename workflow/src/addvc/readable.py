@@ -10,7 +10,7 @@ INDENT = (
 )
 UNCLOSED = "a quote or a bracket is opened and not closed"
 MEANT = {  # beginnings of what the YAML parser says
-    "mapping values are not allowed": INDENT,
+    "mapping values are not allowed": f"{INDENT}; or a space is missing after a colon here or above",
     "expected <block end>": INDENT,
     "could not find expected ':'": "a colon and a space are needed between key and value",
     "found unexpected end of stream": UNCLOSED,
@@ -56,7 +56,7 @@ def fault_words(error: yaml.MarkedYAMLError) -> str:
     said = str(error.problem)
     meant = next((words for start, words in MEANT.items() if said.startswith(start)), said)
     last = error.problem_mark.line + 1
-    first = error.context_mark.line + 1 if error.context_mark and meant != INDENT else last
+    first = error.context_mark.line + 1 if error.context_mark and INDENT not in meant else last
     where = f"line {last}" if first == last else f"lines {first} to {last}"
     if meant == said:
         return f"{where}: {said}"

@@ -1,16 +1,17 @@
 """A line in the terminal for each job that is done, by the logger interface of Snakemake.
 
 `./addvc run` asks for it (`--logger addvc`). It takes the place of what Snakemake says in the terminal
-about jobs that go well, about those that have left their error in their log, and about the place in
-the rules where a fault of the configuration was found. Other warnings, errors and failed logs pass as
-they are. A dry run shows its table of jobs (each of them with --verbose). `.snakemake/log` has
-everything. It is beside `addvc`, which knows nothing of Snakemake.
+about jobs that go well, about those that failed (their error, or the end of their log), and about the
+place in the rules where a fault of the configuration was found. Other warnings and errors pass as they
+are. A dry run shows its table of jobs (each of them with --verbose). `.snakemake/log` has everything.
+It is beside `addvc`, which knows nothing of Snakemake.
 """
 
 import re
 import sys
 import time
 from logging import ERROR, WARNING, LogRecord
+from pathlib import Path
 from typing import Any
 
 from snakemake.logging import ColorizingTextHandler
@@ -64,6 +65,13 @@ def fault(message: str) -> str:
         line for line in words.splitlines() if not re.match(r'  File ".*", line \d+, in ', line)
     ]
     return found + "\n".join(lines)
+
+
+def unexplained(log: str) -> str:
+    """What there is to say of a failed job that has left no error of ours: the end of its log."""
+    lines = Path(log).read_text().splitlines()[-8:] if Path(log).is_file() else []
+    return "\n".join([f"no error of addvc's in {log}, which ends with:" if lines else
+                      f"before it could write {log}; see above", *lines])  # fmt: skip
 
 
 def job_words(rule: str, wildcards: dict[str, Any]) -> str:
@@ -141,11 +149,10 @@ class LogHandler(LogHandlerBase):
         if message.startswith(ENDS) or "At least one job did not complete" in message:
             return
         if event == LogEvent.JOB_ERROR and record.log:
-            said = (
-                "\n".join(filter(None, map(error_in, record.log)))
-                or f"see above and {record.log[0]}"
-            )
+            said = "\n".join(filter(None, map(error_in, record.log))) or unexplained(record.log[0])
             self.say(f"FAILED: {self.jobs.get(record.jobid, record.rule_name)}: {said}")
+        elif killed := re.search(r"died with <Signals\.(\w+)", message):
+            self.say(f"a job was killed by {killed[1]}: by SIGKILL most often for lack of memory")
         elif words := fault(message):
             print(words, file=self.terminal.stream, flush=True)
         elif getattr(record, "exception", "") != "RuleException" or "CalledProcess" not in message:

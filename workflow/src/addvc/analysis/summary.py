@@ -182,7 +182,7 @@ def costs(folder: Path, apart: Sequence[str], states: Iterable[int], meshes: Seq
             continue
         number = {key: _number(row.get(key)) for key in ("cpu_time", "s", "max_rss")}
         rule = path.relative_to(folder).parts[0]
-        named = re.fullmatch(r"((?:meso|micro)[^_]*)(?:_state\d+)?", path.stem)
+        named = re.fullmatch(r"(meso\d[^_]*|micro(?:-.*?)?)(?:_state\d+)?", path.stem)
         numbers = re.findall(r"state(\d+)", path.stem)
         if rule in apart or not wanted.issuperset(numbers) or (named and named[1] not in meshes):
             continue

@@ -151,7 +151,9 @@ def bridge(struts: GreyStruts, gap: Gap, least: float) -> Bridge:
     area = sections_of(curve, inner, struts.solid.voxels[own], struts.solid.share[own])
     points = path(struts, gap.branch, curve, s, length)
     radii = np.maximum(np.sqrt(area / np.pi), least)
-    return Bridge(points, radii, gap.stop - gap.start, int(area.argmin()))
+    between = (inner == s) & (s >= gap.start) & (s <= gap.stop)  # where the section is known
+    thinnest = np.where(between, area, np.inf).argmin() if between.any() else len(s) // 2
+    return Bridge(points, radii, gap.stop - gap.start, int(thinnest))
 
 
 def path(struts: GreyStruts, number: int, curve: Curve, s: np.ndarray, length: float) -> np.ndarray:
