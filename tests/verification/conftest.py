@@ -2,8 +2,8 @@
 
 import pytest
 
-from addvc.correlation.corotational import Problem
 from addvc.correlation.micro import elastic, micro_options, micro_reference
+from addvc.correlation.stages import Problem
 from addvc.fem.shell import shell_points
 from addvc.geometry.stuffing import stuff
 from verification.frame import SECTION, image

@@ -5,18 +5,14 @@ import pytest
 
 from addvc.config import chooses
 from addvc.correlation import corotational as corotational_module
-from addvc.correlation.corotational import (
-    Mending,
-    Stage,
-    corotational,
-    stage_system,
-    with_cutoff,
-)
+from addvc.correlation.corotational import corotational, with_cutoff
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial_of
 from addvc.correlation.gauss_newton import Solution
+from addvc.correlation.mending import Mending
 from addvc.correlation.metric import hessian
 from addvc.correlation.micro import ladder
 from addvc.correlation.register import Stop, register
+from addvc.correlation.stages import Stage, stage_system
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.assembly import node_pattern
 from verification.frame import CORNERS, image, rms_error

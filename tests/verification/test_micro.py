@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addvc.correlation.corotational import Mending, Problem, Stage, corotational
+from addvc.correlation.corotational import corotational
 from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import doubtful_nodes, without
+from addvc.correlation.mending import Mending
 from addvc.correlation.micro import elastic, mending, micro_options, micro_reference, stages
 from addvc.correlation.register import Stop
+from addvc.correlation.stages import Problem, Stage
 from addvc.correlation.uncertainty import Noise
 from verification.frame import CENTRE, CORNERS, SECTION, SHAPE, image, rms_error
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addvc.correlation.corotational import Mending, Problem, Stage, corotational
+from addvc.correlation.corotational import corotational
+from addvc.correlation.mending import Mending
 from addvc.correlation.micro import elastic, micro_options, micro_reference
 from addvc.correlation.register import Stop
+from addvc.correlation.stages import Problem, Stage
 from addvc.correlation.torn import apart, joints_of, torn_joints
 from addvc.fem.operators import corotational_load, stiffness
 from addvc.fem.shell import shell_points

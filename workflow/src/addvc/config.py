@@ -2,8 +2,10 @@
 
 import glob
 import hashlib
+import itertools
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from addvc.errors import ConfigError
@@ -21,6 +23,7 @@ TWIN_SIZES = {
 }  # shape (nx, ny, nz) of the binned image of a twin, voxels
 TWIN_POROSITY = 0.85  # at least
 TWIN_CELL = 8.0  # voxels, at least
+TWIN_STRAIN = 0.5  # nominal, at most
 IMAGING = (  # keys of `twin` that change its scans, but neither foam nor motion
     "bin",
     "noise",
@@ -62,6 +65,28 @@ def case_kind(config: dict) -> str:
             raise ConfigError("`virtual` makes the deformed states: leave out scans.states")
         return "virtual"
     return "scans"
+
+
+def twin_faults(options: dict) -> Iterator[str]:
+    """What keeps a twin of these options from being made; what is left out is right."""
+    strains = options.get("strains", [])
+    if any(later <= earlier for earlier, later in itertools.pairwise((0, *strains))):
+        yield f"twin.strains is {list(strains)}; they must increase from above 0"
+    if max(strains, default=0) > TWIN_STRAIN:
+        yield f"twin.strains is {list(strains)}; at most {TWIN_STRAIN:g} is possible"
+    porosity = options.get("porosity", TWIN_POROSITY)
+    if not TWIN_POROSITY <= porosity < 1:
+        yield (
+            f"`porosity` is {porosity:g}; a twin has at least {TWIN_POROSITY:g} and less than 1, "
+            "outside of that struts merge or vanish: try 0.9 to 0.98"
+        )
+    size, cell = options.get("size", "default"), options.get("cell_size", NOMINAL_CELL)
+    most = min(TWIN_SIZES[size]) / 2
+    if not TWIN_CELL <= cell <= most:
+        yield (
+            f"twin.cell_size is {cell:g}; {TWIN_CELL:g} to {most:g} voxels are possible with size "
+            f"{size}, none outside of that"
+        )
 
 
 def twin_parts(config: dict) -> tuple[dict, dict]:

@@ -1,14 +1,14 @@
 """What is wrong with a configuration: all of it at once, each fault with its key, value and remedy."""
 
 import difflib
-import itertools
 from collections.abc import Iterator
 
 from jsonschema import Draft202012Validator, ValidationError
 
 from addvc import config as settings
 from addvc.config_hints import alternatives, is_text, limit_hint, list_hint, number_hint
-from addvc.errors import ConfigError
+from addvc.config_pairs import pair_faults
+from addvc.errors import ConfigError, refuse
 
 KINDS = {
     "number": "a number",
@@ -30,9 +30,6 @@ LIMITS = {
     "maxItems": "a list of at most {}",
 }
 
-LEAST_POROSITY = 0.3
-"""Solids with less void have no struts to look for."""
-
 
 def check_config(config: dict, schema: dict) -> list[str]:
     """Warnings about a configuration as the user gave it, without defaults.
@@ -42,17 +39,8 @@ def check_config(config: dict, schema: dict) -> list[str]:
     faults = [*key_faults(config, schema), *value_faults(config, schema)]
     faults += pair_faults(config, told=bool(faults))
     if faults:
-        refuse([*faults, *missing_scans(config)])
+        refuse([*faults, *missing_scans(config)], ConfigError)
     return given_warnings(config)
-
-
-def refuse(faults: list[str]) -> None:
-    """ConfigError with all faults, where there are any."""
-    if len(faults) == 1:
-        raise ConfigError(faults[0])
-    if faults:
-        lines = "".join(f"\n- {fault}" for fault in faults)
-        raise ConfigError(f"{len(faults)} things are wrong:{lines}")
 
 
 def key_faults(config: dict, schema: dict, path: str = "") -> Iterator[str]:
@@ -183,113 +171,6 @@ def meaning(error: ValidationError, schema: dict) -> str:
         )
         words = schema.get("description", words)
     return words
-
-
-def pair_faults(config: dict, told: bool = False) -> list[str]:
-    """What does not go together in a configuration whose values are each right; where some are not, and
-    `told`, as far as it can be said."""
-    faults = []
-    checks = (
-        settings.case_kind,
-        check_own_case,
-        check_twin,
-        check_porosity,
-        check_region,
-        check_platens,
-        settings.truth_file,
-        lambda config: settings.meso_names({"meso": {}} | config),
-    )
-    for check in checks:
-        try:
-            check(config)
-        except ConfigError as error:
-            faults.append(str(error))
-        except (TypeError, LookupError, AttributeError, ValueError):  # of a value that is told
-            if not told:
-                raise
-    return list(dict.fromkeys(faults))
-
-
-def check_own_case(config: dict) -> None:
-    """ConfigError where real scans would go to the folder of the demonstration."""
-    if "scans" in config and config.get("case", settings.DEMO) == settings.DEMO:
-        fault = (
-            f"{settings.DEMO}, whose folder is the demonstration's"
-            if "case" in config
-            else "missing"
-        )
-        raise ConfigError(
-            f"`case` is {fault}: give your scans a case of their own, such as `case: mine` "
-            "(results go to results/mine)"
-        )
-
-
-def check_twin(config: dict) -> None:
-    """ConfigError where a twin has no struts to make: strains that do not grow, too dense a foam, cells
-    too large for its image."""
-    if settings.case_kind(config) != "twin":
-        return
-    twin = config.get("twin", {})
-    strains = twin.get("strains", [])
-    if any(later <= earlier for earlier, later in itertools.pairwise(strains)):
-        raise ConfigError(f"twin.strains is {strains}; they must increase from state to state")
-    porosity = config.get("porosity", 1)
-    if porosity < settings.TWIN_POROSITY:
-        raise ConfigError(
-            f"`porosity` is {porosity:g}; a twin has at least {settings.TWIN_POROSITY:g}, or its struts "
-            "would merge: try 0.9 to 0.98"
-        )
-    size, cell = twin.get("size", "default"), twin.get("cell_size", settings.NOMINAL_CELL)
-    most = min(settings.TWIN_SIZES[size]) / 2
-    if not settings.TWIN_CELL <= cell <= most:
-        raise ConfigError(
-            f"twin.cell_size is {cell:g}; {settings.TWIN_CELL:g} to {most:g} voxels are possible with "
-            f"size {size}"
-        )
-
-
-def check_porosity(config: dict) -> None:
-    """ConfigError where real scans come without their porosity, or with that of hardly a foam."""
-    if "scans" not in config:
-        return
-    if "porosity" not in config:
-        raise ConfigError(
-            "`porosity` is missing: give the share of void of your material, which sets the threshold"
-        )
-    share = config["porosity"]
-    if share < LEAST_POROSITY:
-        raise ConfigError(
-            f"`porosity` is {share:g}; at least {LEAST_POROSITY:g} is expected of a material of struts: "
-            f"it is the share of void, not of solid (did you mean {1 - share:g}?)"
-        )
-
-
-def check_region(config: dict) -> None:
-    """ConfigError where a slab of `micro.region` ends before it begins."""
-    region = config.get("micro", {}).get("region", "all")
-    wanted = {} if region == "all" else region
-    low, high = wanted.get("low"), wanted.get("high")
-    if low is not None and high is not None and low >= high:
-        raise ConfigError(
-            f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
-        )
-
-
-def check_platens(config: dict) -> None:
-    """ConfigError where platens are reversed, or a start needs some where there are none."""
-    platens = config.get("scans", {}).get("platens")
-    if isinstance(platens, list) and platens[0] >= platens[1]:
-        raise ConfigError(
-            f"scans.platens is {platens}; give [LOW, HIGH], the lower coordinate along the loading axis "
-            "first"
-        )
-    if platens != "none":
-        return
-    if "extrapolated" in config.get("meso", {}).get("candidates", []):
-        raise ConfigError(
-            "scans.platens is none, and `extrapolated` needs the motion of the platens: leave it out of "
-            "meso.candidates, or say where the platens are"
-        )
 
 
 def missing_scans(config: dict) -> list[str]:

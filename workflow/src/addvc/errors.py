@@ -1,5 +1,6 @@
 """The one family of errors a user can mend: the message gives the value, the limit, the remedy."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 MARK = "ERROR: "
@@ -34,3 +35,13 @@ class MeshError(AddvcError):
 
 class CorrelationError(AddvcError):
     """A linear system or a registration that cannot be solved."""
+
+
+def refuse(faults: Iterable[str], kind: type[AddvcError], what: str = "") -> None:
+    """An error of this kind with all faults, each once, where there are any; `what`: of what."""
+    different = list(dict.fromkeys(faults))
+    if len(different) == 1:
+        raise kind(different[0])
+    if different:
+        lines = "".join(f"\n- {fault}" for fault in different)
+        raise kind(f"{len(different)} things are wrong{what}:{lines}")

@@ -12,12 +12,13 @@ import numpy as np
 from scipy import sparse
 
 from addvc.config import chooses
-from addvc.correlation.corotational import Mending, Problem, Stage, early, stage_system
 from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import residual_limit
+from addvc.correlation.mending import Mending
 from addvc.correlation.metric import Reference, hessian, reference_on
 from addvc.correlation.register import Stop, System
 from addvc.correlation.regularisation import elastic_weight, equilibrium_gap
+from addvc.correlation.stages import Problem, Stage, early, stage_system
 from addvc.correlation.store import load_factor, load_notes, load_order
 from addvc.correlation.torn import joints_of
 from addvc.correlation.uncertainty import Noise

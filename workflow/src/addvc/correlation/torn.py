@@ -6,7 +6,7 @@ course. Most bridges whose surroundings are in doubt are whole, though, and lost
 them (default twin, 28.5 %: 12 of 91), so that doubt alone tells nothing. Those in doubt are therefore
 cut on trial, where they are thinnest (the breaks of the solid twin are within .3 voxel of that): one
 layer of cells loses its stiffness and its points. The cut stays where the images near it are explained
-better once what is in doubt has been carried by its neighbours (`corotational.carried`), each half by
+better once what is in doubt has been carried by its neighbours (`mending.carried`), each half by
 its own, and its sides then move apart. All of them are judged together, once in a state, since a cut
 takes a stage of two factors; and where so little is in doubt that nothing is mended none is tried.
 
@@ -100,11 +100,11 @@ def misfit_near(
     reference: Reference, deformed: np.ndarray, u: np.ndarray, torn: np.ndarray, scale: float | None
 ) -> float:
     """Mean robust square of the residual (grey levels^2) under u (n, 3) at the points within NEAR of
-    torn cells (m,), but for those in them."""
+    torn cells (m,), whose own do not count in the reference (`Problem.tear`)."""
     mesh, q = reference.mesh, reference.quadrature
     away, _ = cKDTree(mesh.points[mesh.cells[torn]].mean(axis=1)).query(
         q.points, distance_upper_bound=NEAR
     )
     r, inside = residual(reference, deformed, u)
-    weight = q.weight * (inside & np.isfinite(away) & ~torn[q.cell])
+    weight = q.weight * (inside & np.isfinite(away))
     return float(weight @ robust_square(r, scale) / max(weight.sum(), 1e-12))

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from addvc.config import scan_files, scan_paths, scan_settings, voxel_size_um
-from addvc.errors import ConfigError, ScanError
+from addvc.errors import ConfigError, ScanError, refuse
 from addvc.images.platens import given_faces
 from addvc.images.scans import Crop, Scan, ScanFormat, binned_shape, open_scan
 
 FINGERPRINT_BYTES = 2**20
+WHAT = " with the scans"
 
 
 class Checked(NamedTuple):
@@ -31,7 +32,7 @@ def check_scans(
     ScanError with all that is wrong.
     """
     found, problems = open_all(paths, fmt or ScanFormat(), factor, crop)
-    refuse(problems)
+    refuse(problems, ScanError, WHAT)
     return [_record(checked) for checked in found]
 
 
@@ -57,7 +58,7 @@ def check_headers(config: dict) -> str:
     known = scan_settings(config, 0)
     form = ScanFormat(**known["format"])
     found, wrong = open_all(there, form, known["bin"], known["crop"], every_slice=False)
-    refuse(problems + wrong)
+    refuse(problems + wrong, ScanError, WHAT)
     region = config.get("micro", {}).get("region", "all")
     length = found[0].binned["xyz".index(config["loading_axis"])]
     check_slab(region, length)
@@ -110,16 +111,6 @@ def _of_all(alike: Sequence[str]) -> str:
     """The first of problems that differ in the path alone, and how many more there are."""
     more = len(alike) - 1
     return alike[0] + (f" (so it is with {more} more scan{'s' * (more > 1)})" if more else "")
-
-
-def refuse(problems: Sequence[str]) -> None:
-    """ScanError with all problems, if there are any, each of them once."""
-    different = list(dict.fromkeys(problems))
-    if len(different) == 1:
-        raise ScanError(different[0])
-    if different:
-        lines = "".join(f"\n- {problem}" for problem in different)
-        raise ScanError(f"{len(different)} things are wrong with the scans:{lines}")
 
 
 def _check_like(scan: Scan, first: Scan) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from addvc.config import TWIN_CELL, TWIN_POROSITY, TWIN_SIZES
+from addvc.config import TWIN_SIZES, twin_faults
 from addvc.errors import ConfigError
 
 SIZES = TWIN_SIZES
@@ -87,19 +87,10 @@ class TwinOptions:
 
     def _faults(self):
         """Pairs (is it wrong?, what to say)."""
-        e = np.array((0.0, *self.strains))
         yield self.size not in SIZES, f"twin size {self.size!r} is none of {sorted(SIZES)}"
         yield self.dtype not in DTYPES, f"twin dtype {self.dtype!r} is none of {DTYPES}"
         yield self.bin < 1 or self.bin != int(self.bin), f"twin bin {self.bin} is no integer >= 1"
-        yield (
-            not TWIN_POROSITY <= self.porosity < 1,
-            f"porosity {self.porosity} is outside [{TWIN_POROSITY}, 1), struts would merge; "
-            "try 0.9 to 0.98",
-        )
-        yield (
-            not (np.all(np.diff(e) > 0) and e[-1] <= 0.5),
-            f"strains {self.strains} must increase from above 0 to at most 0.5",
-        )
+        yield from ((True, words) for words in twin_faults(vars(self)))
         yield not 0 < self.step <= 0.05, f"step {self.step} is outside (0, 0.05]; 0.01 is usual"
         yield self.material not in MATERIALS, f"material {self.material!r} is none of {MATERIALS}"
         yield (
@@ -117,12 +108,6 @@ class TwinOptions:
         for key in ("bow", "scatter", "roughness", "noise", "psf", "cupping", "rings", "drift"):
             value = getattr(self, key)
             yield value < 0, f"{key} {value} is negative; 0 switches it off"
-        size = min(SIZES.get(self.size, (1, 1, 1)))
-        yield (
-            not TWIN_CELL <= self.cell_size <= size / 2,
-            f"cell_size {self.cell_size} is outside [{TWIN_CELL:g}, {size / 2}] voxels for size "
-            f"{self.size!r}",
-        )
 
 
 @dataclass(frozen=True)
