@@ -6,7 +6,7 @@ import pytest
 from addvc.analysis.fields import by_owner, result_fields
 from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_residual
 from addvc.analysis.summary import costs
-from addvc.analysis.truth import error_statistics, errors_at, load_truth
+from addvc.analysis.truth import error_statistics, errors_at, judged_nodes, load_truth
 from addvc.analysis.validity import nodal_residual, valid_nodes, verdict
 from addvc.correlation.doubt import LIMIT, nodal_square, residual_limit
 from addvc.correlation.metric import Reference
@@ -243,6 +243,19 @@ def test_fields_of_a_uniform_strain_on_the_struts(box):
     np.testing.assert_allclose(cells["residual"], -2)
     doubtful, _ = result_fields(micro, u, micro, residual_of(micro, -2.0), noise=0.4)
     assert not doubtful["valid"].any()
+
+
+def test_torn_cells_have_no_strain_and_their_nodes_no_judgement(box):
+    micro = box((0, 0, 0), (4, 6, 5), (4, 6, 5), shake=0.2)
+    residual = residual_of(micro, -2.0)
+    points, cells = result_fields(micro, 0.0 * micro.points, micro, residual, 1.0, torn=[3])
+    assert np.flatnonzero(np.isnan(cells["strain_norm"])).tolist() == [3]
+    gone = np.unique(micro.cells[3])
+    assert np.flatnonzero(points["valid"] == 0).tolist() == gone.tolist()
+    penalised = np.zeros(len(micro.points), int)
+    penalised[7] = 1
+    judged = judged_nodes(micro.cells, penalised, [[], [3]])
+    assert np.flatnonzero(~judged).tolist() == np.union1d(gone, 7).tolist()
 
 
 def test_fields_on_a_coarse_mesh_that_the_struts_fill_in_part(box):

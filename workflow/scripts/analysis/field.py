@@ -4,7 +4,7 @@ from addvc.runtime import job
 from addvc.analysis.fields import result_fields
 from addvc.analysis.noise import load_uncertainty
 from addvc.analysis.residuals import load_residual
-from addvc.correlation.store import load_field
+from addvc.correlation.store import load_field, load_notes
 from addvc.fem.io import read_mesh, write_mesh
 from addvc.images.files import read_json
 
@@ -15,7 +15,8 @@ with job(snakemake):
     for name, path, solution, residual, result in zip(names, *each, snakemake.output, strict=True):
         mesh = read_mesh(path)
         u, r = load_field(solution), load_residual(residual)
-        on_points, on_cells = result_fields(mesh, u, micro, r, noise)
+        torn = load_notes(solution).get("torn_cells", [])
+        on_points, on_cells = result_fields(mesh, u, micro, r, noise, torn)
         if name == snakemake.params.uncertain:
             on_points["uncertainty"] = load_uncertainty(source.uncertainty)[0]
         write_mesh(result, mesh, on_points, on_cells)

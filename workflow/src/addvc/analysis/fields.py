@@ -1,5 +1,7 @@
 """A result as fields on its own mesh: displacement, validity, strain, residual."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from addvc.analysis.residuals import by_cell
@@ -10,13 +12,19 @@ from addvc.fem.operators import strain
 
 
 def result_fields(
-    mesh: Mesh, u: np.ndarray, micro: Mesh, residual: dict, noise: float
+    mesh: Mesh,
+    u: np.ndarray,
+    micro: Mesh,
+    residual: dict,
+    noise: float,
+    torn: Sequence[int] = (),
 ) -> tuple[dict, dict]:
     """Point and cell data of u (n, 3) on `mesh`, the residual being known on the `micro` mesh.
 
     Points: displacement (voxels), residual_rms around the node (grey levels), valid. Cells: strain
     (m, 9), its Frobenius norm (the paper's von Mises strain), residual (grey levels). nan where a
-    meso cell holds no strut."""
+    meso cell holds no strut; torn cells have no strain either, and their nodes are not valid: there is
+    no strut (`correlation.torn`)."""
     r, w, inside = residual["r"], residual["weight"], residual["inside"]
     mean = by_cell(r, w, inside, len(micro.cells))
     around = np.sqrt(residual["node_square"])
@@ -26,7 +34,9 @@ def result_fields(
         held, _ = locate(mesh, micro.points)
         around = nodal_residual(mesh, by_owner(residual["node_square"], held, len(mesh.cells)))
     tensor = strain(mesh, u)
+    tensor[list(torn)] = np.nan
     valid = valid_nodes(around, noise).astype(np.uint8)
+    valid[mesh.cells[list(torn)]] = 0
     points = {"displacement": u, "residual_rms": around, "valid": valid}
     cells = {
         "strain": tensor.reshape(-1, 9),

@@ -1,6 +1,6 @@
 """Errors against a known truth: for judging only. Nothing that measures may import this module."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,21 @@ def load_truth(path: str | Path) -> Judge:
     if Path(path).suffix == ".json":
         return VirtualField.load(path)
     return MeshTruth.load(path) if is_mesh_truth(path) else Truth.load(str(path))
+
+
+def judged_nodes(
+    cells: np.ndarray, penalised: np.ndarray, torn: Iterable[Sequence[int]]
+) -> np.ndarray:
+    """Nodes (n,) bool of the micro mesh that all results of a state are judged at: in the bulk, not
+    `penalised` (n,), and of no cell that a result says is torn.
+
+    The place of a break is known to a voxel, and the truth jumps there: in the solid twin at 15 % by
+    9 voxels from one node to the next, where 2 of 48,212 nodes, on the wrong side, are a fifth of the
+    mean square."""
+    judged = penalised == 0
+    for layer in torn:
+        judged[cells[list(layer)]] = False
+    return judged
 
 
 def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:

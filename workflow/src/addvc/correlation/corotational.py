@@ -21,6 +21,7 @@ from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial_of
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.mending import Mending, mend, trusted
 from addvc.correlation.stages import Problem, Stage, Step, early, run, stage_system
+from addvc.correlation.torn import layers
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +46,7 @@ def corotational(
     then in doubt does not count in the last. The solution has the history of all stages and converged
     if the last one did; of the notes, `stages` has a row of figures for each, `c` and `l_e` are the
     weight of the energy and its cut-off in the end, `risk` the trials of l_E, all in grey levels^2 over
-    the points; `torn`: where bridges are cut (voxels)."""
+    the points; `torn`: where bridges are cut (voxels), `torn_cells`: the cells that this goes across."""
     *before, last = stages
     done: list[Step] = []
     trials: list[dict] = []
@@ -68,6 +69,7 @@ def corotational(
     seconds = sum(solution.seconds for solution in solutions)
     notes = {"stages": list(rows), "c": problem.weight, "l_e": problem.cutoff, "risk": trials}
     notes |= {"torn": [joint.position for joint in problem.cuts]}
+    notes |= {"torn_cells": np.flatnonzero(layers(problem.cuts)).tolist()}
     return replace(solutions[-1], history=history, seconds=seconds), notes
 
 

@@ -140,8 +140,8 @@ def torn_warnings(state: dict, micro: str) -> list[str]:
     count = "1 bridge" if len(torn) == 1 else f"{len(torn)} bridges"
     return [
         f"- State {state['state']}, {micro}: {count} of mesh.mend did not hold, at (x, y, z in voxels) "
-        f"{places}: the images show two halves that move apart, and the mesh was cut there. Strain in "
-        "the cut, a layer of cells, means nothing."
+        f"{places}: the images show two halves that move apart, and the mesh was cut there. The cut, a "
+        "layer of cells, has no strain, and its nodes are not judged."
     ]
 
 
