@@ -512,6 +512,7 @@ def test_struts_with_doubtful_nodes_or_a_neck_are_flagged(cut, lattice):
     struts = [*struts[:2], Strut(**{**vars(struts[2]), "area": area})]
     table = table_under(struts, points, 0.01 * points, valid)
     assert table["valid"] == [1, 0, 0]
+    assert table["flag"] == ["none", "residual", "broken"]
     assert table["whole"] == [1, 1, 0]
 
 
@@ -523,8 +524,9 @@ def test_a_strut_far_from_equilibrium_is_flagged(cut, lattice):
     measured = balanced + rng.normal(0, 0.1, points.shape)
     measured[struts[1].nodes] += 2.0
     fields = {"": Measured(points, balanced), RAW: Measured(points, measured)}
-    flagged = np.flatnonzero(np.array(strut_table(struts, fields, valid, NU)["valid"]) == 0)
-    assert_array_equal(flagged, [1])
+    table = strut_table(struts, fields, valid, NU)
+    assert_array_equal(np.flatnonzero(np.array(table["valid"]) == 0), [1])
+    assert table["flag"][1] == "equilibrium" and table["flag"].count("none") == len(struts) - 1
     fields = {"": Measured(points, measured), RAW: Measured(points, measured)}
     assert all(strut_table(struts, fields, valid, NU)["valid"])
 
@@ -538,13 +540,15 @@ def table_of(energies, valid=None):
     columns["axial_strain"] = np.sqrt(energies[:, 1])
     columns["dominance"] = np.array(["bending"] * len(energies))
     columns["valid"] = np.ones(len(energies)) if valid is None else np.asarray(valid)
+    columns["flag"] = np.where(columns["valid"] > 0, "none", "residual")
     return columns | {"whole": np.ones(len(energies))}
 
 
 def test_the_share_of_the_foam_is_weighted_with_energy_over_valid_struts():
     found = foam(table_of([[9, 1, 0], [0, 90, 0], [0, 0, 5]], valid=[1, 1, 0]))
     assert found["valid"] == 2
-    assert found["flagged"] == 1
+    assert found["flagged"] == found["flags"]["residual"] == 1
+    assert sum(found["flags"].values()) == 1
     assert_allclose(found["bending_share"], 9 / 100)
     assert_allclose(found["stretching_share"], 91 / 100)
 

@@ -34,8 +34,15 @@ GEOMETRY = {
     "junction_b": ("–", "number of the junction at the second end, -1 for none"),
     "neighbours": ("–", "rows (from 0) of the struts that share a junction with it"),
     "valid": ("–", "1: measured, whole or not, its residual small, near equilibrium; 0: flagged"),
-}
+    "flag": ("–", "why it is flagged: broken (by the threshold), residual (its nodes are in doubt), "
+                  "equilibrium (far from that), shape (no motion of a beam); none: it is not"),
+}  # fmt: skip
 """Columns that do not depend on the displacement, with unit and meaning."""
+
+FLAGS = ("broken", "residual", "equilibrium", "shape")
+"""Why a strut is flagged: the first that holds."""
+
+UNFLAGGED = "none"
 
 MECHANICS = {
     "axial_strain": ("–", "stretch of the centre line less 1, between the junctions"),
@@ -74,17 +81,18 @@ def strut_table(
     """Columns by name: the geometry, and the mechanics under each displacement of the micro nodes,
     whose names end in the keys of `fields`; the first is what `valid` (n,) of the nodes judges. nu:
     Poisson's ratio of the solid."""
-    sound = np.array([
-        not strut.broken and valid_strut(valid[strut.nodes], strut.weight) for strut in struts
-    ], dtype=bool)  # fmt: skip
-    if RAW in fields:
-        sound &= ~astray(struts, fields[""], fields[RAW])
+    broken = np.array([strut.broken for strut in struts], dtype=bool)
+    doubtful = np.array([not valid_strut(valid[s.nodes], s.weight) for s in struts], dtype=bool)
+    away = astray(struts, fields[""], fields[RAW]) if RAW in fields else np.zeros_like(broken)
+    sound = ~(broken | doubtful | away)
     columns: dict[str, list] = {}
     for suffix, field in fields.items():
         found = mechanics(struts, field, sound, nu)
         columns |= {name + suffix: values for name, values in found.items()}
-    measured = np.isfinite(columns["bending_share"])
-    return geometry(struts) | {"valid": list((sound & measured).astype(int))} | columns
+    shapeless = ~np.isfinite(columns["bending_share"])
+    flags = np.select([broken, doubtful, away, shapeless], FLAGS, UNFLAGGED)
+    judged = {"valid": list((flags == UNFLAGGED).astype(int)), "flag": list(flags)}
+    return geometry(struts) | judged | columns
 
 
 def astray(struts: list[Strut], balanced: Measured, measured: Measured) -> np.ndarray:
@@ -95,8 +103,8 @@ def astray(struts: list[Strut], balanced: Measured, measured: Measured) -> np.nd
 
 
 def geometry(struts: list[Strut]) -> dict[str, list]:
-    """The columns that do not depend on the displacement, but for `valid`."""
-    names = [name for name in GEOMETRY if name != "valid"]
+    """The columns that do not depend on the displacement, but for `valid` and `flag`."""
+    names = [name for name in GEOMETRY if name not in ("valid", "flag")]
     if not struts:
         return {name: [] for name in names}
     rows = []
@@ -180,20 +188,25 @@ def dominance(energy: StrutEnergy) -> str:
 
 
 def foam(columns: dict[str, Sequence], suffix: str = "") -> dict:
-    """Of the valid struts: how many, shares of the energy of all of them with the deviation of that
-    of bending, number of struts of each dominance."""
+    """How many struts are valid, and flagged, by reason; of the valid ones the shares of the energy of
+    all of them with the deviation of that of bending, number of struts of each dominance."""
     valid = np.asarray(columns["valid"], dtype=float) > 0
     energies = np.array([np.asarray(columns[kind + suffix], float)[valid] for kind in KINDS])
     total = np.nansum(energies)
+    flags = list(columns["flag"])
+    counts = {
+        "valid": int(valid.sum()),
+        "flagged": int((~valid).sum()),
+        "flags": {flag: flags.count(flag) for flag in FLAGS},
+    }
     if not total > 0:
-        return {"valid": int(valid.sum()), "flagged": int((~valid).sum()), "bending_share": None}
+        return counts | {"bending_share": None}
     part = np.nan_to_num(energies.sum(axis=0) / total)
     doubt = np.nan_to_num(np.asarray(columns["bending_share_std" + suffix], float)[valid])
     kinds = np.asarray(columns["dominance" + suffix])[valid]
-    return {
-        "valid": int(valid.sum()),
-        "flagged": int((~valid).sum()),
-        **{f"{k}_share": float(np.nansum(e) / total) for k, e in zip(KINDS, energies, strict=True)},
+    shares = zip(KINDS, energies, strict=True)
+    return counts | {
+        **{f"{kind}_share": float(np.nansum(energy) / total) for kind, energy in shares},
         "bending_share_std": float(np.sqrt(np.sum((part * doubt) ** 2))),
         "dominance": {kind: int((kinds == kind).sum()) for kind in (*KINDS, UNDECIDED)},
     }

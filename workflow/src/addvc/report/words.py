@@ -27,6 +27,21 @@ VERDICTS = {
     "failed": "FAILED: not to be used",
 }
 
+REASONS = {
+    "broken": "broken by the threshold",
+    "residual": "in doubt",
+    "equilibrium": "far from equilibrium",
+    "shape": "unlike a beam",
+}
+
+TERMS = (
+    "A node is *valid* where the residual around it is what noise explains, else *in doubt* (`valid` 0 "
+    "in the files). A strut is *flagged* where the threshold broke it, most of it is in doubt, it lies "
+    "far from equilibrium, or moves unlike a beam (`flag` in the table of struts). A state is "
+    "*converged* where the loop ended and at most 5 % of the nodes are in doubt."
+)
+"""What the first page means by the words of its verdicts."""
+
 
 def closing_lines(summary: dict, folder: str) -> str:
     """A few lines for the end of a run: what was made, where, each state's verdict, what next."""
@@ -56,11 +71,18 @@ def closing_lines(summary: dict, folder: str) -> str:
 
 
 def flag_words(struts: dict | None) -> str:
-    """How many struts are flagged: doubtful, broken by the threshold, far from equilibrium, or not
-    measured."""
+    """How many struts are flagged, and why."""
     if not struts:
         return ""
-    return f", {struts['flagged']} of {struts['valid'] + struts['flagged']} struts flagged"
+    count = f"{struts['flagged']} of {struts['valid'] + struts['flagged']}"
+    return f", {count} struts flagged{reason_words(struts)}"
+
+
+def reason_words(struts: dict) -> str:
+    """Why struts are flagged, by number."""
+    counts = struts["flags"]
+    told = [f"{counts[flag]} {words}" for flag, words in REASONS.items() if counts[flag]]
+    return f": {', '.join(told)}" if told else ""
 
 
 def alone_words(state: dict) -> str:
@@ -119,7 +141,8 @@ def answer(summary: dict) -> list[str]:
             f"valid{noise_words(state, size)}{error_words(found['error'])}."
             f"{strut_words(state.get('struts'))}" + band_words(state.get("cells"))
         )
-    return [*lines, *bridge_words(summary.get("topology")), "", cost_words(summary["cost"])]
+    lines += ["", TERMS, *bridge_words(summary.get("topology"))]
+    return [*lines, "", cost_words(summary["cost"])]
 
 
 def shown(picture: str | None, summary: dict) -> list[str]:
@@ -209,7 +232,8 @@ def strut_words(struts: dict | None) -> str:
     """How the foam carries its load, as far as its struts could be measured."""
     if not struts:
         return ""
-    count = f"{struts['valid']} valid struts ({struts['flagged']} flagged)"
+    flagged = f"{struts['flagged']} flagged{reason_words(struts)}"
+    count = f"{struts['valid']} valid struts ({flagged})"
     if struts["bending_share"] is None:
         return f" No share of bending: {count}."
     verdict = "Bending" if struts["bending_share"] > 0.5 else "Not bending"
