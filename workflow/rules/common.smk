@@ -20,6 +20,16 @@ STARTED = time.time()
 SCHEMA = WORKFLOW / "schemas/config.schema.yaml"
 
 
+def images_words(config):
+    """What the images of a case are; of scans after a look at each."""
+    if "scans" in config:
+        from addvc.images.scans_check import check_headers  # slow to load
+
+        return check_headers(config)
+    twin, states = config["twin"], len(settings.state_labels(config))
+    return f"a synthetic test, {twin['size']}, seed {twin['seed']}, of {states} states"
+
+
 def checked_config(config):
     """The configuration with its defaults; WorkflowError says which keys are wrong, and the remedy."""
     try:
@@ -36,10 +46,12 @@ def checked_config(config):
                 end="",
                 file=sys.stderr,
             )
-        if "scans" in config and workflow.is_main_process:
-            from addvc.images.scans_check import check_headers  # slow to load
-
-            print(f"addvc: {check_headers(config)}", file=sys.stderr)
+        if workflow.is_main_process:
+            print(
+                f"addvc: case {config['case']}: {images_words(config)}; "
+                f"results/{config['case']}/report.html tells what was found",
+                file=sys.stderr,
+            )
         return [settings.scan_files(path) for path in settings.scan_paths(config)]
     except AddvcError as error:
         raise WorkflowError(

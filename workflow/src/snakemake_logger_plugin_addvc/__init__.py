@@ -10,6 +10,7 @@ It is beside `addvc`, which knows nothing of Snakemake.
 import re
 import sys
 import time
+from difflib import get_close_matches
 from logging import ERROR, WARNING, LogRecord
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,9 @@ ROUTINE = (  # beginnings of messages that have no event and tell the user nothi
 CONFIGURATION = "Configuration of case "
 """How a message on a fault of the configuration begins (rules/common.smk)."""
 
+STUDIES = ("ablation", "sensitivity")
+"""Targets with a name."""
+
 TARGETS = "A target is `ablation`, `sensitivity` or a file below results/CASE: see ./addvc help."
 """What may stand after `./addvc run`."""
 
@@ -65,6 +69,15 @@ def fault(message: str) -> str:
         line for line in words.splitlines() if not re.match(r'  File ".*", line \d+, in ', line)
     ]
     return found + "\n".join(lines)
+
+
+def no_target(message: str) -> str:
+    """What to say of a target that no rule makes, from Snakemake's message; "" if that is not known."""
+    found = re.search(r"No rule to produce (\S+)", message)
+    if not found:
+        return ""
+    close = get_close_matches(found[1].lower(), STUDIES, 1)
+    return f"{found[1]}: nothing makes that" + (f"; did you mean {close[0]}?" if close else ".")
 
 
 def unexplained(log: str) -> str:
@@ -103,7 +116,7 @@ class LogHandler(LogHandlerBase):
         self.terminal = ColorizingTextHandler(nocolor=settings.nocolor, stream=stream)
         self.start = time.monotonic()
         self.jobs: dict[int, str] = {}
-        self.done = ""
+        self.done = self.count = ""
         self.stopped = self.shown = self.ending = False
 
     def emit(self, record: LogRecord) -> None:
@@ -115,7 +128,8 @@ class LogHandler(LogHandlerBase):
             print("A run is at work in this folder. Left to do:", file=self.terminal.stream)
         elif str(record.msg).startswith(STOPPING):
             self.stopped = True
-            self.say("interrupted: what was done is kept, the same command goes on from there")
+            kept = f"{self.count} are done and kept" if self.count else "what was done is kept"
+            self.say(f"interrupted: {kept}, the same command goes on from there")
         elif record.levelno >= ERROR:
             self.tell_error(record, event)
         elif record.levelno >= WARNING or self.common_settings.verbose:
@@ -132,8 +146,9 @@ class LogHandler(LogHandlerBase):
         elif event == LogEvent.JOB_FINISHED:
             self.done = self.jobs.get(record.job_id, str(record.msg))
         elif event == LogEvent.PROGRESS:
+            self.count = f"{record.done} of {record.total} steps"
             share = record.done / max(record.total, 1)
-            self.say(f"{record.done} of {record.total} steps ({share:.0%}) done: {self.done}")
+            self.say(f"{self.count} ({share:.0%}) done: {self.done}")
 
     def tell_ending(self) -> None:
         """That a run ends by kill, once."""
@@ -156,9 +171,10 @@ class LogHandler(LogHandlerBase):
         elif words := fault(message):
             print(words, file=self.terminal.stream, flush=True)
         elif getattr(record, "exception", "") != "RuleException" or "CalledProcess" not in message:
-            self.show(record)
-            if getattr(record, "exception", "") == "MissingRuleException":
-                print(TARGETS, file=self.terminal.stream, flush=True)
+            if words := no_target(message):
+                print(words, TARGETS, file=self.terminal.stream, flush=True)
+            else:
+                self.show(record)
 
     def tell_jobs(self, record: LogRecord) -> None:
         """How many jobs there are; in a dry run, the table of them."""
