@@ -56,7 +56,7 @@ def folder(tmp_path, cube):
         for state in (1, 2):
             result = Solution(0.01 * state * cube.points, [0.1, 1e-2 / 100**state], state == 1,
                               residual={"mean": 0.0, "std": 1.5, "outside": 0})  # fmt: skip
-            save_solution(tmp_path / f"dvc/{name}_state{state}.h5", result)
+            save_solution(tmp_path / f"dvc/{name}_state{state}.h5", result, cube)
             write_vtu(tmp_path / f"fields/{name}_state{state}.vtu", cube.points, cube.cells,
                       {"valid": np.full(len(cube.points), 2 - state, np.uint8)})  # fmt: skip
             path = tmp_path / f"analysis/residual_{name}_state{state}.h5"
@@ -89,6 +89,12 @@ def test_titles_tell_of_loops_that_did_not_end_and_of_lost_struts(case):
     assert case.title(2, "meso9") == "5.2 %: not converged"
     assert case.title(2, "micro") == "5.2 %: failed"
     assert case.shown_state() == 1
+
+
+def test_a_title_tells_of_elements_turned_inside_out(case, folder, cube):
+    mirror = Solution(cube.points * [-2, 0, 0], [0.1], True, residual={})
+    save_solution(folder / "dvc/meso9_state1.h5", mirror, cube)
+    assert case.title(1, "meso9") == "3.4 %: converged, 100.0% inverted"
 
 
 def test_labels_survive_keys_that_are_words(folder):

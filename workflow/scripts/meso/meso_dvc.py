@@ -21,6 +21,7 @@ with job(snakemake):
         size = read_json(figures)["mean_edge"]
         options = meso_options(params.meso, size, params.axis, coarsest, degree)
         fields = coarser if coarsest else coarser | others
-        solution, notes = meso_dvc(read_mesh(path), images, options, fields, name, ladder)
-        save_solution(output, solution, **notes)
+        mesh = read_mesh(path)
+        solution, notes = meso_dvc(mesh, images, options, fields, name, ladder)
+        save_solution(output, solution, mesh, **notes)
         coarser = {name: mesh_field(path, output)}

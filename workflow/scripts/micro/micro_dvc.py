@@ -23,8 +23,8 @@ with job(snakemake):
     else:
         order, notes = load_order(source.factor)
         problem = problem_of(reference, notes, micro["nu"], order, read_json(source.bridges))
-        levels, blur = read_json(source.threshold), snakemake.params.blur
-        plan = stages(micro, levels, method), mending(micro, levels)
-        cutoffs = ladder(micro, levels, blur, method)
-        solution, notes = corotational(problem, deformed, start, *plan, cutoffs)
-    save_solution(snakemake.output[0], solution, **notes)
+        levels = read_json(source.threshold)
+        cutoffs = ladder(micro, levels, snakemake.params.blur, method)
+        plan = stages(micro, levels, method), mending(micro, levels), cutoffs
+        solution, notes = corotational(problem, deformed, start, *plan)
+    save_solution(snakemake.output[0], solution, reference.mesh, **notes)

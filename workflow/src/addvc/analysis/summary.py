@@ -14,7 +14,6 @@ from addvc import __version__
 from addvc.analysis.validity import verdict
 from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_vtu
-from addvc.fem.mesh import Mesh, inverted_cells
 from addvc.images.files import read_json
 
 PACKAGES = (
@@ -126,9 +125,9 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
     name = f"{mesh}_state{state}"
     solution, notes = load_solution(folder / f"dvc/{name}.h5")
     residual = read_json(folder / f"analysis/residual_{name}.json")
-    points, cells, point, _ = read_vtu(folder / f"fields/{name}.vtu")
+    _, _, point, _ = read_vtu(folder / f"fields/{name}.vtu")
     return {
-        "inverted": inverted_cells(Mesh(points, cells), point["displacement"]) / len(cells),
+        "inverted": notes["inverted"],
         "start": notes.get("best"),
         "l_e": notes.get("l_e"),
         "torn": notes.get("torn", []),

@@ -11,14 +11,18 @@ import numpy as np
 from scipy import sparse
 
 from addvc.correlation.gauss_newton import Solution
+from addvc.fem.mesh import Mesh, inverted_share
 from addvc.images.files import atomic_path
 
 if TYPE_CHECKING:
     from addvc.fem.solver import Factor
 
 
-def save_solution(path: str | Path, solution: Solution, **notes) -> None:
-    """u (n, 3) in voxels, history, verdict; `notes` is anything JSON knows (e.g. a table)."""
+def save_solution(path: str | Path, solution: Solution, mesh: Mesh | None = None, **notes) -> None:
+    """u (n, 3) in voxels, history, verdict; `notes` is anything JSON knows (e.g. a table). Of a solution
+    on a `mesh`, `inverted` of the notes is the share of its cells that u turns inside out."""
+    if mesh is not None:
+        notes["inverted"] = inverted_share(mesh, solution.u)
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         file["u"] = solution.u
         file["u"].attrs["unit"] = "voxel"

@@ -43,9 +43,9 @@ def physical_gradients(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return gradients, weights * np.linalg.det(jacobian)
 
 
-def inverted_cells(mesh: Mesh, u: np.ndarray) -> int:
-    """How many cells a displacement u (n, 3), voxels, turns inside out."""
-    return int((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).sum())
+def inverted_share(mesh: Mesh, u: np.ndarray) -> float:
+    """Share of the cells that a displacement u (n, 3), voxels, turns inside out."""
+    return float((cell_volumes(Mesh(mesh.points + u, mesh.cells)) <= 0).mean())
 
 
 def cell_volumes(mesh: Mesh) -> np.ndarray:

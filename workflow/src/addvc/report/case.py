@@ -16,6 +16,9 @@ from addvc.images.files import read_json
 from addvc.images.scans_store import load_volume
 from addvc.images.specimen import Specimen
 
+FOLDED = 0.01
+"""Share of elements turned inside out from which on it is told."""
+
 
 class UndeclaredInput(RuntimeError):
     """A figure reads a file that its rule does not name, so that a change would not remake it."""
@@ -147,9 +150,13 @@ class Case:
         return int(foam[self.micro[0]]["flagged"])
 
     def verdict(self, mesh: str, state: int) -> str:
-        """What to think of a result: `converged`, `not converged` or `failed`; of the default micro
+        """What to think of a result: `converged`, `not converged` or `failed`; with the share of the
+        elements that it turns inside out, where these are more than a few, and of the default micro
         method with the number of struts that are flagged."""
         words = self.status(mesh, state) or "converged"
+        inverted = load_notes(self.path(f"dvc/{mesh}_state{state}.h5"))["inverted"]
+        if inverted > FOLDED:
+            words += f", {inverted:.1%} inverted"
         if mesh != self.micro[0] or words == "failed":
             return words
         count = self.flagged(state)

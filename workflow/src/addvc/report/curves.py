@@ -4,23 +4,29 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.slices import slice_across
+from addvc.report.slices import slab_across
 
 
 def cell_size(case: Case, outputs: Iterable[str]) -> None:
-    """Fig. 4: (a) radial autocorrelation with its secondary peak, (b) a slice of the reference."""
+    """Fig. 4: (a) radial autocorrelation with its secondary peak, (b) a slab of the reference, half a
+    cell thick, with a circle a cell wide."""
     fig = style.figure(72)
     left, right = fig.subplots(1, 2, width_ratios=(1.1, 1))
     volume = case.image(0, smooth=False)
     _autocorrelation(left, case.json("geometry/cell_size.json"), case.voxel_um)
     style.headline(left, "autocorrelation of the reference", 0)
-    slice_across(right, volume, case.specimen)
+    slab_across(right, volume, case.specimen, max(round(case.cell_size / 2), 1))
+    radius = case.cell_size / 2
+    corner = radius + 1, radius + 1
+    right.add_patch(Circle(corner, radius, fill=False, color=style.RED, lw=1.2))
+    right.text(*corner, "cell size", color=style.RED, fontsize=6, ha="center", va="center")
     style.scale_bar(right, case.voxel_um)
-    style.headline(right, "slice across the loading axis", 1)
+    style.headline(right, "slab across the loading axis", 1)
     style.save(fig, outputs)
 
 
@@ -63,14 +69,28 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
         style.headline(ax, f"{kind} ({name})", number)
         ax.set_xlabel("residual r (grey levels)")
         ax.xaxis.set_major_locator(MaxNLocator(5))
-        ax.legend(loc="upper left", handlelength=1.4, borderaxespad=0.1, fontsize=7)
-    low, high = axes[0].get_ylim()
-    axes[0].set(
-        ylabel="density (1 / grey level)",
-        xlim=(-reach, reach),
-        ylim=(low, low + (high - low) * (1.1 + 0.07 * (len(case.states) + 1))),
-    )
+        ax.legend(
+            loc="upper left", handlelength=0, handletextpad=0, labelcolor="linecolor", fontsize=7
+        )
+    axes[0].set(ylabel="density (1 / grey level)", xlim=(-reach, reach))
+    fig.legend(handles=_density_handles(case), loc="outside lower center", ncols=3, fontsize=7)
     style.save(fig, outputs)
+
+
+def _density_handles(case: Case) -> list:
+    """A line a state, that of a result that is not right, that of noise alone."""
+    lines = [style.line(style.SERIES[(n - 1) % 6], case.labels[n]) for n in case.states]
+    if any(case.status(name, n) for name in (case.finest, *case.micro) for n in case.states):
+        lines.append(style.line("k", "failed or not converged", "--"))
+    if known := _noise_stds(case):
+        span = f"{min(known):.2f} to {max(known):.2f}" if len(known) > 1 else f"{known[0]:.2f}"
+        lines.append(style.line(style.DARK, f"noise alone, σ = {span}", ":"))
+    return lines
+
+
+def _noise_stds(case: Case) -> list[float]:
+    """What noise alone would leave of the residual in each state, where the images show it."""
+    return [std for std in case.json("analysis/image_noise.json").values() if std is not None]
 
 
 def _state_handles(case: Case) -> list:
@@ -82,13 +102,11 @@ def _state_handles(case: Case) -> list:
 
 def _noise_alone(ax: Axes, case: Case, reach: float) -> None:
     """The normal distribution that noise alone would give, of the state that has most of it."""
-    known = [std for std in case.json("analysis/image_noise.json").values() if std is not None]
-    if not known:
+    if not (known := _noise_stds(case)):
         return
     r, std = np.linspace(-reach, reach, 400), max(known)
     density = np.exp(-0.5 * (r / std) ** 2) / (std * np.sqrt(2 * np.pi))
-    label = f"noise alone, σ = {std:.2f}"
-    ax.plot(r, density, color=style.DARK, ls=":", lw=1, label=label, zorder=1)
+    ax.plot(r, density, color=style.DARK, ls=":", lw=1, zorder=1)
 
 
 def _reach(case: Case) -> float:
@@ -108,14 +126,13 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
     counts, edges = np.histogram(r, bins=120, range=(-reach, reach), weights=weight)
     density = counts / (weight.sum() * np.diff(edges))
     wrong = case.status(name, state)
-    label = f"{case.labels[state]}, σ = {stats['std']:.2f}" + (f", {wrong}" if wrong else "")
     ax.plot(
         (edges[1:] + edges[:-1]) / 2,
         density,
         color=style.SERIES[(state - 1) % 6],
         ls="--" if wrong else "-",
         lw=1.3,
-        label=label,
+        label=f"σ = {stats['std']:.2f}",
     )
 
 

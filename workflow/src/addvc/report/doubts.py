@@ -1,10 +1,10 @@
 """What to distrust in a result: the section of the first page that is never silently empty."""
 
 from addvc.analysis.balance import refusal
+from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
-FOLDED = 0.01  # share of elements turned inside out
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
 
 

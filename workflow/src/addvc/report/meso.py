@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from addvc.fem.mesh import Mesh, inverted_cells
+from addvc.fem.mesh import Mesh
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, oblique, render
@@ -28,17 +28,11 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             render([layer], view, 170 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
             sigma = f"σ(r) = {solution.residual['std']:.2f} grey levels"
-            style.note(ax, sigma + _inverted(mesh, solution.u), fontsize=8)
+            style.note(ax, sigma, fontsize=8)
         style.row_name(axes[row, 0], name)
     style.scale_bar(axes[-1, 0], case.voxel_um, 0.4, y=-0.2)
     style.axis_arrows(axes[-1, -1], view.right, view.up, y=-0.28)
     style.save(fig, outputs)
-
-
-def _inverted(mesh: Mesh, u: np.ndarray) -> str:
-    """How many tetrahedra the displacement turns inside out, where it does."""
-    count = inverted_cells(mesh, u)
-    return f"\n{count} of {len(mesh.cells):,} inverted" if count else ""
 
 
 def _reach(mesh: Mesh) -> np.ndarray:

@@ -26,9 +26,10 @@ def show_slice(ax: Axes, plane: np.ndarray, limits: tuple[float, float]) -> None
     ax.set_aspect("equal")
 
 
-def slice_across(ax: Axes, volume: np.ndarray, specimen: Specimen) -> None:
-    """The plane across the loading axis in the middle of the specimen."""
-    plane = np.take(volume, round((specimen.low + specimen.high) / 2), axis=specimen.axis)
+def slab_across(ax: Axes, volume: np.ndarray, specimen: Specimen, thickness: int) -> None:
+    """The brightest voxels of a slab across the loading axis in the middle of the specimen."""
+    first = round((specimen.low + specimen.high - thickness) / 2)
+    plane = volume.take(range(first, first + thickness), axis=specimen.axis).max(axis=specimen.axis)
     show_slice(ax, plane, tuple(np.percentile(plane, (0.5, 99.8))))
     ax.set_axis_off()
 
@@ -69,6 +70,8 @@ def _grid_over_slice(ax: Axes, volume: np.ndarray, specimen: Specimen, nodes: np
         ax.axhline(face, color=style.ORANGE, lw=1.2, ls="--")
         words = {"color": style.ORANGE, "fontsize": 8, "fontweight": "bold"}
         ax.text(0.02 * plane.shape[0], face + shift, "platen", va=side, **words)
+        end = along[0] if side == "top" else along[-1]
+        ax.fill_between(across[[0, -1]], face, end, color=style.ORANGE, alpha=0.15, lw=0)
     ax.set_axis_off()
 
 
