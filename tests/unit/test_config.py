@@ -124,6 +124,27 @@ def test_a_scan_is_a_file_a_folder_or_a_pattern(scans):
     assert settings.scan_files(str(scans / "a/s*.tif")) == slices
 
 
+def test_all_files_of_a_scan_are_known(tmp_path, monkeypatch):
+    """A header with the file that it names, and what a folder of Zarr holds; ~ is the home folder."""
+    (tmp_path / "a.mhd").write_text("NDims = 3\nElementDataFile = a.raw\n")
+    (tmp_path / "a.nhdr").write_text("NRRD0004\ndata file: a.raw\n")
+    (tmp_path / "a.raw").touch()
+    (tmp_path / "b.zarr/c/0").mkdir(parents=True)
+    (tmp_path / "b.zarr/zarr.json").touch()
+    (tmp_path / "b.zarr/c/0/1").touch()
+    found = {
+        name: settings.scan_files(str(tmp_path / name)) for name in ("a.mhd", "a.nhdr", "b.zarr")
+    }
+    assert found == {
+        "a.mhd": [str(tmp_path / "a.mhd"), str(tmp_path / "a.raw")],
+        "a.nhdr": [str(tmp_path / "a.nhdr"), str(tmp_path / "a.raw")],
+        "b.zarr": [str(tmp_path / "b.zarr/c/0/1"), str(tmp_path / "b.zarr/zarr.json")],
+    }
+    monkeypatch.setenv("HOME", str(tmp_path))
+    config = {"scans": {"reference": "~/a.mhd", "states": ["b.tif"]}}
+    assert settings.scan_paths(config) == [str(tmp_path / "a.mhd"), "b.tif"]
+
+
 def test_suffixes_of_slices_may_be_capitals(scans):
     (scans / "b").mkdir()
     (scans / "b/S1.TIF").write_bytes(b"0")

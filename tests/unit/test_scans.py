@@ -5,7 +5,9 @@ import os
 import h5py
 import numpy as np
 import pytest
+import SimpleITK as sitk
 import tifffile
+import zarr
 from numpy.testing import assert_allclose, assert_array_equal
 
 import addvc.images.scans as scans
@@ -20,6 +22,7 @@ from addvc.images.scans import (
     save_volume,
 )
 from addvc.images.scans_check import check_scans
+from addvc.images.scans_itk import SUFFIXES as ITK_SUFFIXES
 
 SHAPE = (34, 37, 41)  # x, y, z
 RAW = ScanFormat(shape=SHAPE[::-1], dtype="uint16")
@@ -66,14 +69,23 @@ def write(path, pages):
         case "volume.h5":
             with h5py.File(path, "w") as file:
                 file["entry/data"] = pages
+        case "volume.zarr":
+            zarr.open_group(path, mode="w").create_array("0/data", data=pages, chunks=(8, 16, 16))
+        case "plain.zarr":
+            zarr.save_array(path, pages)
         case "stack":
             write_stack(path, pages)
+        case name if path.suffix in ITK_SUFFIXES:
+            image = sitk.GetImageFromArray(pages)
+            sitk.WriteImage(image, path, useCompression="packed" in name)
         case _:
             pages.tofile(path)
 
 
 NAMES = ["pages.tif", "packed.tiff", "imagej.tif", "big.tif", "plain.TIF", "array.npy"]
 NAMES += ["fortran.npy", "volume.h5", "stack", "scan.raw", "scan.vol", "scan.bin"]
+NAMES += ["volume.zarr", "plain.zarr", "a.nrrd", "packed.nrrd", "a.nhdr", "a.mha", "packed.mha"]
+NAMES += ["a.mhd", "packed.mhd", "a.nii", "a.nii.gz"]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -184,6 +196,53 @@ def test_truncated_imagej_and_others(tmp_path, pages):
         write(path, pages)
         os.truncate(path, int(path.stat().st_size * 0.8))
         expect(f"{name}: .*copy", path)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.mha", r"a\.mha: holds \d+ bytes \(at least 103156 for the voxels"),
+        ("a.mhd", r"a\.raw: holds \d+ bytes"),
+        ("a.nrrd", r"a\.nrrd: holds \d+ bytes"),
+        ("a.nii", r"a\.nii: holds \d+ bytes"),
+        ("packed.mha", r"packed\.mha: cannot be read .*; copy the file again"),
+        ("packed.nrrd", r"packed\.nrrd: cannot be read .*; copy the file again"),
+        ("a.nii.gz", r"a\.nii\.gz: cannot be unpacked .*; copy the file again"),
+    ],
+)
+def test_truncated_medical_formats(tmp_path, pages, name, message):
+    write(tmp_path / name, pages)
+    data = tmp_path / name.replace(".mhd", ".raw")
+    os.truncate(data, data.stat().st_size // 2)
+    with pytest.raises(ScanError, match=message):
+        read_binned(open_scan(tmp_path / name))
+
+
+def test_vectors_of_a_medical_format_are_no_grey_levels(tmp_path, pages):
+    sitk.WriteImage(
+        sitk.GetImageFromArray(np.stack([pages] * 3, -1), isVector=True), tmp_path / "a.nrrd"
+    )
+    with pytest.raises(ScanError, match="has 3 values a voxel"):
+        open_scan(tmp_path / "a.nrrd")
+
+
+def test_zarr_array_is_chosen_or_asked_for(tmp_path, volume, pages):
+    group = zarr.open_group(tmp_path / "two.zarr", mode="w")
+    group.create_array("0", data=pages)
+    group.create_array("1", data=pages[::2, ::2, ::2])
+    group.create_array("flat", data=pages[0])
+    with pytest.raises(ScanError, match=r"holds 2 .*set scans.dataset to one of: 0, 1"):
+        open_scan(tmp_path / "two.zarr")
+    assert_array_equal(
+        read_binned(open_scan(tmp_path / "two.zarr", ScanFormat(dataset="0"))), volume
+    )
+    with pytest.raises(ScanError, match="no array '7'"):
+        open_scan(tmp_path / "two.zarr", ScanFormat(dataset="7"))
+    with pytest.raises(ScanError, match="has 2 dimensions"):
+        open_scan(tmp_path / "two.zarr", ScanFormat(dataset="flat"))
+    (tmp_path / "empty.zarr").mkdir()
+    with pytest.raises(ScanError, match="not a readable Zarr folder"):
+        open_scan(tmp_path / "empty.zarr")
 
 
 def test_raw_size_names_both_counts_and_a_type_that_fits(tmp_path, pages):

@@ -109,6 +109,6 @@ if KIND == "virtual":
             code=code("twin/virtual_scan.py"),
             virtual=config["virtual"],
             settings=settings.scan_settings(config, 0),
-            scan=config["scans"]["reference"],
+            scan=scan_path(0),
         script:
             "../scripts/twin/virtual_scan.py"

@@ -13,6 +13,9 @@ from addvc.errors import ConfigError
 AXES = {"x": 0, "y": 1, "z": 2}
 NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
 NOMINAL_CELL = 28.0
+HEADERS = {".mhd": r"ElementDataFile\s*=\s*(.+)", ".nhdr": r"data ?file\s*:\s*(.+)"}
+"""Scans of two files: how the header names the one with the voxels."""
+
 DEMO = "twin"  # the case that the default configuration has
 TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
 TWIN_SIZES = {
@@ -107,6 +110,7 @@ def twin_folder(options: dict) -> str:
 def truth_file(config: dict) -> str | None:
     """The user's own truth, None where there is none; ConfigError when it is not there."""
     path = config.get("truth")
+    path = None if path is None else str(Path(path).expanduser())
     if path is not None and not Path(path).is_file():
         raise ConfigError(
             f"truth {path} was not found; paths start at {Path.cwd()}: correct or leave out `truth`"
@@ -193,21 +197,34 @@ def scan_paths(config: dict) -> list[str]:
     """The scans of the user's own, as the configuration has them: the reference, then the states."""
     if "scans" not in config:
         return []
-    return [config["scans"]["reference"], *config["scans"]["states"]]
+    paths = [config["scans"]["reference"], *config["scans"]["states"]]
+    return [str(Path(path).expanduser()) for path in paths]
+
+
+def header_data(path: Path) -> Path:
+    """The file that has the voxels of a scan: itself, or the one that a header (.mhd, .nhdr) names."""
+    pattern = HEADERS.get(path.suffix.lower())
+    named = pattern and re.search(pattern, path.read_text(errors="replace"), re.IGNORECASE)
+    data = path.parent / named[1].strip() if named else path
+    return data if data.is_file() else path
 
 
 def scan_files(path: str) -> list[str]:
-    """The files of a scan: itself, those of a folder, or those a pattern finds.
+    """The files of a scan: itself and what holds its voxels, those of a folder, or of a pattern.
 
     Raises ConfigError when there is none."""
     place = Path(path)
     if place.is_file():
-        return [path]
-    slices = [file for file in place.glob("[!.]*") if file.suffix.lower() in (".tif", ".tiff")]
+        return list(dict.fromkeys((path, str(header_data(place)))))
+    everything = place.suffix == ".zarr"
+    slices = [
+        file
+        for file in (place.rglob("*") if everything else place.glob("[!.]*"))
+        if file.is_file() and (everything or file.suffix.lower() in (".tif", ".tiff"))
+    ]
     found = sorted(map(str, slices)) if place.is_dir() else sorted(glob.glob(path))
     if not found:
         hint = "curly quotes around it? " if re.search("[\u2018-\u201f]", path) else ""
-        hint += "write the whole path in place of ~: " if path.startswith("~") else ""
         raise ConfigError(
             f"scan {path} was not found (0 files; at least 1); {hint}paths start at {Path.cwd()}: "
             "correct scans.reference or scans.states"

@@ -22,9 +22,13 @@ from addvc.images.scans_formats import (
     open_npy,
     open_raw,
 )
+from addvc.images.scans_itk import SUFFIXES as ITK_SUFFIXES
+from addvc.images.scans_itk import open_itk
 from addvc.images.scans_store import load_volume, save_volume
 from addvc.images.scans_tiff import SUFFIXES as TIFF_SUFFIXES
 from addvc.images.scans_tiff import open_stack, open_tiff
+from addvc.images.scans_zarr import SUFFIX as ZARR_SUFFIX
+from addvc.images.scans_zarr import open_zarr
 
 __all__ = [
     "Scan",
@@ -43,6 +47,8 @@ OPENERS: dict[str, Callable[[Path, ScanFormat], Source]] = {
     **dict.fromkeys((".raw", ".vol", ".bin"), open_raw),
     ".npy": open_npy,
     **dict.fromkeys((".h5", ".hdf5"), open_hdf5),
+    **dict.fromkeys(ITK_SUFFIXES, open_itk),
+    ZARR_SUFFIX: open_zarr,
 }
 MIN_SIZE = 16  # voxels in each direction after binning
 SLAB_VOXELS = 2**24  # read at once: 64 MB as float32
@@ -78,7 +84,7 @@ class Scan:
 def open_scan(
     path: str | os.PathLike, fmt: ScanFormat | None = None, every_slice: bool = True
 ) -> Scan:
-    """Open a TIFF, raw, .npy or HDF5 file, a folder of TIFF slices or a pattern of their names.
+    """Open a file of one of OPENERS, a folder of TIFF slices or a pattern of their names.
 
     Reads headers only; of slices, that of each, or of the first and last. Raises ScanError when it
     is missing, unknown, truncated, not three-dimensional or not of real grey values.
@@ -109,7 +115,7 @@ def _open_source(path: Path, fmt: ScanFormat, every_slice: bool) -> Source:
     if not path.exists():
         where = "an absolute path" if path.is_absolute() else f"relative to {Path.cwd()}"
         raise ScanError(f"{path}: no such file or folder ({where}); correct the path")
-    if path.is_dir():
+    if path.is_dir() and path.suffix != ZARR_SUFFIX:
         files = [file for file in path.iterdir() if file.suffix.lower() in TIFF_SUFFIXES]
         files = [file for file in files if not file.name.startswith(".")]
         return open_stack(files, str(path), every_slice)

@@ -7,7 +7,7 @@ memory map or handle outlives it.
 
 import glob
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +26,7 @@ class ScanFormat:
 
     axes: order of the axes as stored, slowest first: 'zyx' for TIFF pages along z, rows along y.
     shape, dtype, byte_order ('little' or 'big'), header_bytes: of raw files only, the shape in the
-    file's own axis order. dataset: path inside an HDF5 file, needed when it holds several volumes.
+    file's own axis order. dataset: path inside an HDF5 or Zarr file that holds several volumes.
     """
 
     axes: str = "zyx"
@@ -148,7 +148,7 @@ def open_hdf5(path: Path, fmt: ScanFormat) -> Source:
     """
     try:
         with h5py.File(path, "r") as file:
-            name = fmt.dataset or _only_volume(path, file)
+            name = fmt.dataset or only_volume(path, _volumes(file))
             found = file.get(name)
             if not isinstance(found, h5py.Dataset):
                 names = ", ".join(_volumes(file)) or "(none)"
@@ -178,9 +178,8 @@ def _volumes(file: h5py.File) -> list[str]:
     return names
 
 
-def _only_volume(path: Path, file: h5py.File) -> str:
-    """The one volume of an HDF5 file."""
-    names = _volumes(file)
+def only_volume(path: Path, names: Sequence[str]) -> str:
+    """The one volume of a file that has volumes of these names; ScanError unless there is one."""
     if len(names) != 1:
         raise ScanError(
             f"{path}: holds {len(names)} three-dimensional datasets, 1 is needed; "
