@@ -99,6 +99,8 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         (scans(crop=[20, 100]), r"`scans.crop` is \[20, 100\]; it must be a list of at least 3\."),
         (scans(platens=[130, 10]), r"scans.platens is \[130, 10\]; give \[LOW, HIGH\]"),
         (scans(platens="both"), "it must be auto, none or a list"),
+        (scans(crop=[0, 9, 0, 9, 0, 9]), r"mean \[\[0, 9\], \[0, 9\], \[0, 9\]\]\?"),
+        (scans(crop=[None, [9, 3], None]), "scans.crop of y is 9 to 3; use START < STOP"),
         ({"geometry": {"cell_size": "1.2mm"}}, r"auto or a number \(write 1.2, without its unit\)"),
         (
             scans(crop=[[-5, 10], None, None]),

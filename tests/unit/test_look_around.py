@@ -45,8 +45,8 @@ def case(tmp_path, bar):
     save_partition(tmp_path / "geometry/struts.h5", struts, np.zeros((0, 3)))
     for state in (1, 2):
         u = state * SLOPE * bar.points * [0, 1, 0]
-        save_solution(tmp_path / f"dvc/micro_state{state}.h5", Solution(u, [1e-4], True))
-        save_solution(tmp_path / f"dvc/meso9_state{state}.h5", Solution(u, [1e-4], True))
+        save_solution(tmp_path / f"dvc/micro_state{state}.h5", Solution(u, [1e-4], True), bar)
+        save_solution(tmp_path / f"dvc/meso9_state{state}.h5", Solution(u, [1e-4], True), bar)
         for name in ("micro", "meso9"):
             write_vtu(tmp_path / f"fields/{name}_state{state}.vtu", bar.points, bar.cells,
                       {"displacement": u, "valid": np.ones(len(u), np.uint8)},

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.readable import fault
 from snakemake_logger_plugin_addvc import clock, job_words
 
@@ -178,6 +178,17 @@ def test_a_dry_run_tells_the_jobs_in_a_table_or_each_with_its_reason(snakemake):
 def test_nothing_to_be_done_is_said(snakemake):
     snakemake("meso12_state1.txt")
     assert "Nothing to be done" in snakemake("meso12_state1.txt")[1]
+
+
+def test_figures_are_told_in_words():
+    figures = {
+        "rms": 0.123456,
+        "foam": {"micro": {"valid": 7}},
+        "kind": "box",
+        "best": None,
+        "r": [1],
+    }
+    assert told(figures) == "rms 0.1235, foam.micro.valid 7, kind box"
 
 
 def test_words_and_clock():

@@ -624,7 +624,7 @@ def test_figures_against_the_truth_become_rows_with_units(tmp_path):
         write_json(tmp_path / f"analysis/struts_truth_state{state}.json",
                    judged(table, true, {"micro": "", "meso9": ""}) | {"flags": FLAGS})  # fmt: skip
         result = Solution(np.zeros((4, 3)), [1e-4], state == 1, residual={})
-        save_solution(tmp_path / f"dvc/micro_state{state}.h5", result)
+        save_solution(tmp_path / f"dvc/micro_state{state}.h5", result, inverted=0.0)
         write_vtu(tmp_path / f"fields/micro_state{state}.vtu", np.eye(4, 3), np.arange(4)[None],
                   {"valid": np.ones(4)})  # fmt: skip
         write_json(tmp_path / f"struts_state{state}.json", {"foam": {"micro": {"flagged": 3}}})

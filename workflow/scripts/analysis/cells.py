@@ -1,6 +1,6 @@
 """Strain at the scale of a cell in one state, and the bands in which it gathers."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.cell_strain import cell_strain, columns
 from addvc.analysis.localisation import MEANING, localisation
 from addvc.analysis.strut_store import write_columns
@@ -15,6 +15,6 @@ with job(snakemake) as log:
     weight, valid = nodal_volumes(mesh), point["valid"].ravel()
     found = cell_strain(mesh.points, point["displacement"], weight, valid, size)
     figures = localisation(found.points, found.along(axis), axis)
-    log.info("%s", figures)
+    log.info(told(figures))
     write_columns(snakemake.output.table, columns(found, axis))
     write_json(snakemake.output.notes, {"localisation": figures, "meaning": MEANING})

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.cell_strain import cell_strain, columns
 from addvc.analysis.localisation import compared, localisation
 from addvc.analysis.strut_store import read_columns, write_columns
@@ -20,6 +20,6 @@ with job(snakemake) as log:
     strain = read_columns(source.table)["axial_strain"]
     measured = read_json(source.notes)["localisation"]
     figures = compared(measured, band, strain, true.along(axis).ravel())
-    log.info("%s", figures)
+    log.info(told(figures))
     write_columns(snakemake.output.table, columns(true, axis))
     write_json(snakemake.output.figures, figures)

@@ -1,6 +1,6 @@
 """Section 4.2.2: the residuals of one state at the points of the micro quadrature."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.residuals import residual_on, save_residual
 from addvc.correlation.micro import micro_reference
 from addvc.correlation.store import load_field
@@ -17,6 +17,6 @@ with job(snakemake) as log:
     deformed = load_coefficients(source.deformed)[0]
     for field, arrays, statistics in zip(source.fields, made.arrays, made.statistics, strict=True):
         result = residual_on(reference, deformed, load_field(field))
-        log.info("%s: %s", field, result["statistics"])
+        log.info("%s: %s", field, told(result["statistics"]))
         write_json(statistics, result["statistics"])
         save_residual(arrays, result)

@@ -1,6 +1,6 @@
 """What every strut undergoes in a state: motion, bending, stretching, twist, their energies."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.balance import micro_fields
 from addvc.analysis.noise import turned
 from addvc.analysis.strut_frame import load_frame
@@ -27,4 +27,4 @@ with job(snakemake) as log:
     notes = {"foam": whole, "equilibrium": balance}
     write_columns(snakemake.output.table, table)
     write_json(snakemake.output.notes, notes | {"columns": described(list(fields))})
-    log.info("%s", notes)
+    log.info(told(notes))

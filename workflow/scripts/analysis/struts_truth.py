@@ -1,6 +1,6 @@
 """Measured struts against the truth."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.strut_store import load_partition, read_columns, write_columns
 from addvc.analysis.struts_truth import flags, judged, true_columns
 from addvc.analysis.truth import load_truth
@@ -17,6 +17,6 @@ with job(snakemake) as log:
     table = read_columns(source.table)
     error = load_field(source.solution) - truth.displacement(points, state)
     figures = judged(table, true, results) | {"flags": flags(struts, table["valid"], error)}
-    log.info("%s", figures)
+    log.info(told(figures))
     write_columns(snakemake.output.table, true)
     write_json(snakemake.output.figures, figures)

@@ -1,6 +1,6 @@
 """Dangling stubs, necks and welds of the micro mesh."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.strut_store import load_partition
 from addvc.analysis.topology import Moved, topology
 from addvc.correlation.store import load_field
@@ -24,5 +24,5 @@ with job(snakemake) as log:
     cut = classes["surface"].ravel() > 0
     mesh, bridges = Mesh(points, cells), read_json(source.bridges)
     found = topology(mesh, cut, strut_graph(solid), struts, states, bridges)
-    log.info("%s", found["counts"])
+    log.info(told(found["counts"]))
     write_json(snakemake.output[0], found)

@@ -1,6 +1,6 @@
 """The errors of one state against the known truth, at bulk nodes of the micro mesh (less torn ones)."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.truth import errors_at, judged_nodes, load_truth
 from addvc.correlation.store import load_field, load_notes
 from addvc.fem.io import read_vtu
@@ -14,5 +14,5 @@ with job(snakemake) as log:
     state = int(snakemake.wildcards.state)
     found = errors_at(load_truth(snakemake.input.truth), points[judged], fields, state)
     for path, result in zip(snakemake.output, found, strict=True):
-        log.info("%s: %s", path, result)
+        log.info("%s: %s", path, told(result))
         write_json(path, result)

@@ -1,6 +1,6 @@
 """The standard uncertainty of each node and strut from the noise of the images."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.noise import (
     figures,
     save_uncertainty,
@@ -16,6 +16,6 @@ with job(snakemake) as log:
     nodes = standard_uncertainty(draws)
     struts = strut_uncertainty(load_partition(snakemake.input.struts)[0], draws)
     found = figures(nodes, struts, len(draws))
-    log.info("%s", found)
+    log.info(told(found))
     save_uncertainty(snakemake.output.arrays, nodes, struts)
     write_json(snakemake.output.figures, found)

@@ -1,6 +1,6 @@
 """Whether the errors of micro DVC are those that the noise lets expect, at valid bulk nodes."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.noise import calibration, load_uncertainty
 from addvc.analysis.truth import load_truth
 from addvc.fem.io import read_vtu
@@ -13,5 +13,5 @@ with job(snakemake) as log:
     true = load_truth(source.truth).displacement(points[use], state)
     nodes, _ = load_uncertainty(source.uncertainty)
     found = calibration(measured["displacement"][use] - true, nodes[use])
-    log.info("%s", found)
+    log.info(told(found))
     write_json(snakemake.output[0], found)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.overlap import REST, overlap
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_mesh
@@ -18,5 +18,5 @@ with job(snakemake) as log:
     found = {REST: overlap(mesh, still, reference, gamma, region)}
     for name, path in zip(snakemake.params.names, source.fields, strict=True):
         found[name] = overlap(mesh, load_field(path), image, gamma, region)
-    log.info("%s", found)
+    log.info(told(found))
     write_json(snakemake.output[0], found)

@@ -1,6 +1,6 @@
 """The candidate start of micro DVC with the least score, by residual and energy."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.correlation.micro import micro_options, micro_reference, robust_scale
 from addvc.correlation.micro_start import best_candidate, judge
 from addvc.correlation.store import load_field, save_field
@@ -19,6 +19,6 @@ with job(snakemake) as log:
     deformed = load_coefficients(source.deformed)[0]
     best, table = best_candidate(judge(reference, options, scale), deformed, starts)
     for row in table:
-        log.info("%s", row)
+        log.info(told(row))
     log.info("micro DVC starts from %s", best)
     save_field(snakemake.output[0], starts[best], best=best, candidates=table)

@@ -1,6 +1,6 @@
 """What one variant of micro DVC found in one state, as a row of figures."""
 
-from addvc.runtime import job
+from addvc.runtime import job, told
 from addvc.analysis.residuals import load_residual
 from addvc.analysis.variant import settings, variant_figures
 from addvc.correlation.micro import micro_options
@@ -23,5 +23,5 @@ with job(snakemake) as log:
     figures = read_json(source.figures)
     row["kept"] = figures["kept_fraction"] * figures["voxel_kept_fraction"]
     row["error"] = read_json(source.error) if source.get("error") else None
-    log.info("%s", row)
+    log.info(told(row))
     write_json(snakemake.output[0], row)

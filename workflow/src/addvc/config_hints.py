@@ -32,7 +32,10 @@ def list_hint(value, schema: dict) -> str:
 
 
 def limit_hint(key: str, value) -> str:
-    """A guess where a number is beyond its limit: a share in per cent, a voxel in another unit."""
+    """A guess where a value is beyond its limit: a share in per cent, a voxel in another unit, pairs in
+    one list."""
+    if key == "scans.crop" and isinstance(value, list) and len(value) == 6:
+        return f" (did you mean {[value[:2], value[2:4], value[4:]]}?)"
     if not isinstance(value, int | float):
         return ""
     if key == "porosity" and 1 < value < 100:

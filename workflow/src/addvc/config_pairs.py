@@ -18,6 +18,7 @@ def pair_faults(config: dict, told: bool = False) -> list[str]:
         check_porosity,
         check_region,
         check_platens,
+        check_crop,
         settings.truth_file,
         lambda config: settings.meso_names({"meso": {}} | config),
     )
@@ -81,6 +82,15 @@ def check_region(config: dict) -> None:
         raise ConfigError(
             f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
         )
+
+
+def check_crop(config: dict) -> None:
+    """ConfigError where a part of `scans.crop` ends before it begins."""
+    for name, pair in zip("xyz", config.get("scans", {}).get("crop") or [], strict=False):
+        if pair is not None and pair[0] >= pair[1]:
+            raise ConfigError(
+                f"scans.crop of {name} is {pair[0]} to {pair[1]}; use START < STOP, voxels of the scan"
+            )
 
 
 def check_platens(config: dict) -> None:

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from addvc.errors import MARK, AddvcError
@@ -70,6 +70,21 @@ def job(snakemake) -> Iterator[logging.Logger]:
         for handler in handlers:
             log.removeHandler(handler)
             handler.close()
+
+
+def told(figures: Mapping) -> str:
+    """Figures as a log has them: "rms 0.0693, foam.micro.valid 456"; without None and lists."""
+    return ", ".join(f"{name} {value}" for name, value in _flat(figures))
+
+
+def _flat(figures: Mapping, lead: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in figures.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{lead}{key}.")
+        elif isinstance(value, float):
+            yield f"{lead}{key}", f"{value:.4g}"
+        elif isinstance(value, bool | int | str):
+            yield f"{lead}{key}", str(value)
 
 
 @contextlib.contextmanager
