@@ -11,10 +11,11 @@ its own, and its sides then move apart. All of them are judged together, once in
 takes a stage of two factors; and where so little is in doubt that nothing is mended none is tried.
 
 In the compressed solid of tests/solid_twin at 15 % two bridges are torn, by 5 and 9 voxels. Once their
-halves are carried the misfit near them is .89 of that of whole ones, and the rms error in the end .149
-voxel, not .194 (with other noise .70, and .313 voxel, not .863). Where all bridges are whole (three
-twins at 28.5 %, the solid at 8 %) it is 1.01 to 1.08, and the cut, were it kept, would cost up to twice
-the error; at 12.3 % no bridge is in doubt.
+halves are carried the misfit near them is .89 of that of whole ones, and the rms error of all nodes .149
+voxel in the end, not .194; .129 without the nodes of the cuts (`analysis.truth.judged_nodes`). With
+other noise the misfit is .70 of that, and the error .313 voxel, not .863. Where all bridges are whole
+(three twins at 28.5 %, the solid at 8 %) it is 1.01 to 1.08, and the cut, were it kept, would cost up to
+twice the error; at 12.3 % no bridge is in doubt.
 """
 
 from collections.abc import Sequence
