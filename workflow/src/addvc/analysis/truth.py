@@ -27,7 +27,7 @@ def judged_nodes(
 
     The place of a break is known to a voxel, and the truth jumps there: in the solid twin at 15 % by
     9 voxels from one node to the next, where 2 of 48,212 nodes, on the wrong side, are a fifth of the
-    mean square."""
+    mean square of the error normal to the struts."""
     judged = penalised == 0
     for layer in torn:
         judged[cells[list(layer)]] = False

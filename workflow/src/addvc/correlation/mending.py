@@ -9,7 +9,9 @@ more change nothing.
 """
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -75,9 +77,11 @@ def mend(
             break
         most = HELPED * doubtful.mean()
         log.info("micro DVC: %.2f %% of the nodes are let go", 100 * doubtful.mean())
-        steps = carried(problem, deformed, u, last, doubtful)
-        if not done:
-            cuts, steps = helpful_cuts(problem, deformed, u, last, doubtful, mending, steps)
+        carry = partial(carried, deformed=deformed, u=u, last=last, doubtful=doubtful)
+        if done:
+            steps = carry(problem)
+        else:
+            cuts, steps = helpful_cuts(problem, deformed, carry, last.scale, mending.limit)
             problem = whole.tear(cuts)
         done += steps + seen_again(problem, deformed, steps[-1][0].u, last)
         u = done[-1][0].u
@@ -108,24 +112,22 @@ def seen_again(problem: Problem, deformed: np.ndarray, u: np.ndarray, last: Stag
 def helpful_cuts(
     problem: Problem,
     deformed: np.ndarray,
-    u: np.ndarray,
-    last: Stage,
-    doubtful: np.ndarray,
-    mending: Mending,
-    whole: list[Step],
+    carry: Callable[[Problem], list[Step]],
+    scale: float | None,
+    limit: float,
 ) -> tuple[list[Joint], list[Step]]:
-    """The bridges that are in doubt after `whole`, the stages in which doubtful nodes (n,) are carried
-    from u (n, 3), and these stages with those bridges cut, if that explains the images near them
-    better; else none, and `whole`. What is not taken leaves no trace in the history."""
-    mesh = problem.reference.mesh
-    still = doubtful_nodes(problem.reference, deformed, whole[-1][0].u, mending.limit)
+    """The stages in which what is in doubt is carried; with the bridges cut that are in doubt (over
+    `limit`, grey levels) after them, and these bridges, if that explains the images near them better.
+    What is not taken leaves no trace in the history."""
+    mesh, whole = problem.reference.mesh, carry(problem)
+    still = doubtful_nodes(problem.reference, deformed, whole[-1][0].u, limit)
     cuts = torn_joints(mesh, problem.joints, still)
     if not cuts:
         return [], whole
     cut = problem.tear(cuts)
-    steps = carried(cut, deformed, u, last, doubtful)
+    steps = carry(cut)
     before, after = (
-        misfit_near(cut.reference, deformed, way[-1][0].u, layers(cuts), last.scale)
+        misfit_near(cut.reference, deformed, way[-1][0].u, layers(cuts), scale)
         for way in (whole, steps)
     )
     taken = after < BETTER * before
