@@ -254,7 +254,7 @@ def test_torn_cells_have_no_strain_and_their_nodes_no_judgement(box):
     assert np.flatnonzero(points["valid"] == 0).tolist() == gone.tolist()
     penalised = np.zeros(len(micro.points), int)
     penalised[7] = 1
-    judged = judged_nodes(micro.cells, penalised, [[], [3]])
+    judged = judged_nodes(micro.cells, penalised, [3])
     assert np.flatnonzero(~judged).tolist() == np.union1d(gone, 7).tolist()
 
 

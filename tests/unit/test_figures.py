@@ -94,7 +94,7 @@ def test_titles_tell_of_loops_that_did_not_end_and_of_lost_struts(case):
 def test_a_title_tells_of_elements_turned_inside_out(case, folder, cube):
     mirror = Solution(cube.points * [-2, 0, 0], [0.1], True, residual={})
     save_solution(folder / "dvc/meso9_state1.h5", mirror, cube)
-    assert case.title(1, "meso9") == "3.4 %: converged, 100.0% inverted"
+    assert case.title(1, "meso9") == "3.4 %: converged, 100.0 % inverted"
 
 
 def test_labels_survive_keys_that_are_words(folder):

@@ -3,11 +3,14 @@
 import logging
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from addvc.runtime import job, told
@@ -113,18 +116,22 @@ def test_a_fault_of_the_configuration_is_told_without_the_place_in_the_rules(sna
 
 def test_ctrl_c_ends_a_job_and_the_run_without_a_traceback(snakemake, tmp_path):
     (tmp_path / "slow.py").write_text(
-        "import time\nfrom addvc.runtime import job\ntime.sleep(60)\n"
+        "import time\nfrom addvc.runtime import job\nopen('begun', 'w')\ntime.sleep(60)\n"
     )
     (tmp_path / "Snakefile").write_text(
         "rule slow:\n    output: 'slow.txt'\n    log: 'slow.log'\n    script: 'slow.py'\n"
     )
-    command = ["timeout", "-s", "INT", "4", sys.executable, "-m", "snakemake", "--logger", "addvc"]
+    command = [sys.executable, "-m", "snakemake", "--logger", "addvc", "--cores", "1"]
     env = os.environ | {"PYTHONPATH": str(SOURCE)}
-    done = subprocess.run(
-        [*command, "--cores", "1"], cwd=tmp_path, env=env, capture_output=True, text=True
+    run = subprocess.Popen(
+        command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    assert done.returncode and "interrupted" in done.stderr
-    assert "Traceback" not in done.stderr and "Error in rule" not in done.stderr
+    while run.poll() is None and not (tmp_path / "begun").exists():
+        time.sleep(0.1)
+    os.killpg(run.pid, signal.SIGINT)
+    said = run.communicate(timeout=60)[1]
+    assert run.returncode and "interrupted" in said
+    assert "Traceback" not in said and "Error in rule" not in said
 
 
 def test_kill_ends_a_run_after_the_jobs_at_work(snakemake, tmp_path):
@@ -182,13 +189,14 @@ def test_nothing_to_be_done_is_said(snakemake):
 
 def test_figures_are_told_in_words():
     figures = {
-        "rms": 0.123456,
-        "foam": {"micro": {"valid": 7}},
+        "rms": np.float32(0.123456),
+        "foam": {"micro": {"valid": np.int64(7)}},
         "kind": "box",
         "best": None,
         "r": [1],
+        "ended": True,
     }
-    assert told(figures) == "rms 0.1235, foam.micro.valid 7, kind box"
+    assert told(figures) == "rms 0.1235, foam.micro.valid 7, kind box, ended True"
 
 
 def test_words_and_clock():

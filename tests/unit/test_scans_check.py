@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+import SimpleITK as sitk
 import tifffile
 
 from addvc.errors import ConfigError, GeometryError, ScanError
@@ -84,6 +85,13 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path, pages):
         )
     assert "was not found (0 files; at least 1)" in lines[0]
     assert check_headers(config(good)).startswith("1 scan of 34 x 37 x 41 voxels")
+
+
+def test_two_headers_of_the_same_voxels_are_one_scan(tmp_path, pages):
+    sitk.WriteImage(sitk.GetImageFromArray(pages), tmp_path / "a.mhd")
+    (tmp_path / "b.mhd").write_text("Comment = b\n" + (tmp_path / "a.mhd").read_text())
+    with pytest.raises(ScanError, match=r"scans.states\[0\] is the same scan as scans.reference"):
+        check_headers(config(tmp_path / "a.mhd", tmp_path / "b.mhd"))
 
 
 def test_a_scan_that_is_listed_twice_is_refused(tmp_path, pages):

@@ -113,6 +113,7 @@ if HAS_TRUTH:
         input:
             mesh=f"{R}/geometry/micro.vtu",
             fields=on_micro(JUDGED),
+            torn=f"{R}/dvc/{MICRO[0]}_state{{state}}.h5",
             truth=TRUTH,
         output:
             of_state("analysis/error_{mesh}_state{state}.json", JUDGED),

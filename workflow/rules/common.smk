@@ -40,16 +40,11 @@ def checked_config(config):
         validate(config, str(SCHEMA))
         studies.check(config, list(settings.state_labels(config)))
         if workflow.is_main_process:
-            print(
-                *(f"WARNING: {words}\n" for words in warnings),
-                sep="",
-                end="",
-                file=sys.stderr,
-            )
-        if workflow.is_main_process:
+            for words in warnings:
+                print(f"WARNING: {words}", file=sys.stderr)
             print(
                 f"addvc: case {config['case']}: {images_words(config)}; "
-                f"results/{config['case']}/report.html tells what was found",
+                f"the report will be results/{config['case']}/report.html",
                 file=sys.stderr,
             )
         return [settings.scan_files(path) for path in settings.scan_paths(config)]
@@ -60,6 +55,8 @@ def checked_config(config):
 
 
 SCAN_FILES = checked_config(config)
+WHOLE = (".nrrd", ".nhdr", ".mha", ".mhd", ".gz")  # held whole, or may be compressed
+SCAN_MEMORY = 6.0 if any(str(p[0]).lower().endswith(WHOLE) for p in SCAN_FILES) else 1.0
 CASE = config["case"]
 KIND = settings.case_kind(config)
 R = f"results/{CASE}"

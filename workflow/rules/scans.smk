@@ -68,7 +68,7 @@ rule volume:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1000, 1.0),
+        mem_mb=memory(1000, SCAN_MEMORY),
         runtime=60,
     params:
         code=code("scans/volume.py"),

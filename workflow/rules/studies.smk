@@ -204,6 +204,7 @@ if STATES:
             input:
                 mesh=given("classes"),
                 fields=[own("solution")],
+                torn=torn_on,
                 truth=TRUTH,
             output:
                 [own("error")],

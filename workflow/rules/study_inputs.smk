@@ -31,6 +31,12 @@ if STATES:
             file, R, config, wildcards.get("state", "")
         )
 
+    def torn_on(wildcards):
+        """The main result of the state, which tells what is torn, where a variant has its mesh."""
+        mesh = given("classes")(wildcards)
+        same = mesh == f"{R}/geometry/micro.vtu"
+        return f"{R}/dvc/{MICRO[0]}_state{wildcards.state}.h5" if same else []
+
     def method_of_variant(wildcards):
         """The method of micro DVC."""
         return variant_of(wildcards).method

@@ -8,7 +8,7 @@ from addvc.images.files import write_json
 
 with job(snakemake) as log:
     points, cells, classes, _ = read_vtu(snakemake.input.mesh)
-    torn = [load_notes(path).get("torn_cells", []) for path in snakemake.input.fields]
+    torn = load_notes(snakemake.input.torn).get("torn_cells", []) if snakemake.input.torn else []
     judged = judged_nodes(cells, classes["penalised"], torn)
     fields = (load_field(path)[judged] for path in snakemake.input.fields)
     state = int(snakemake.wildcards.state)

@@ -4,6 +4,7 @@ import glob
 import hashlib
 import itertools
 import json
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,8 +14,12 @@ from addvc.errors import ConfigError
 AXES = {"x": 0, "y": 1, "z": 2}
 NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
 NOMINAL_CELL = 28.0
-HEADERS = {".mhd": r"ElementDataFile\s*=\s*(.+)", ".nhdr": r"data ?file\s*:\s*(.+)"}
-"""Scans of two files: how the header names the one with the voxels."""
+META_DATA, NRRD_DATA = r"^ElementDataFile\s*=\s*(.+?)\s*$", r"^data ?file\s*:\s*(.+?)\s*$"
+HEADERS = {".mhd": META_DATA, ".mha": META_DATA, ".nhdr": NRRD_DATA, ".nrrd": NRRD_DATA}
+"""Scans that may be of two files: how the header names the one with the voxels."""
+
+HEADER_BYTES = 2**15
+"""How far a header goes, at most."""
 
 DEMO = "twin"  # the case that the default configuration has
 TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
@@ -110,7 +115,7 @@ def twin_folder(options: dict) -> str:
 def truth_file(config: dict) -> str | None:
     """The user's own truth, None where there is none; ConfigError when it is not there."""
     path = config.get("truth")
-    path = None if path is None else str(Path(path).expanduser())
+    path = None if path is None else os.path.expanduser(path)
     if path is not None and not Path(path).is_file():
         raise ConfigError(
             f"truth {path} was not found; paths start at {Path.cwd()}: correct or leave out `truth`"
@@ -194,19 +199,33 @@ def voxel_size_um(config: dict) -> float:
 
 
 def scan_paths(config: dict) -> list[str]:
-    """The scans of the user's own, as the configuration has them: the reference, then the states."""
+    """The scans of the user's own: the reference, then the states, ~ being the home folder."""
     if "scans" not in config:
         return []
     paths = [config["scans"]["reference"], *config["scans"]["states"]]
-    return [str(Path(path).expanduser()) for path in paths]
+    return [os.path.expanduser(path) for path in paths]
 
 
-def header_data(path: Path) -> Path:
-    """The file that has the voxels of a scan: itself, or the one that a header (.mhd, .nhdr) names."""
+def voxel_file(path: Path) -> Path:
+    """The file that has the voxels of a scan: itself, or the one that its header names.
+
+    Raises ConfigError when it is not there, or there are several."""
     pattern = HEADERS.get(path.suffix.lower())
-    named = pattern and re.search(pattern, path.read_text(errors="replace"), re.IGNORECASE)
-    data = path.parent / named[1].strip() if named else path
-    return data if data.is_file() else path
+    if pattern is None:
+        return path
+    with path.open("rb") as file:
+        header = file.read(HEADER_BYTES).partition(b"\n\n")[0].decode("latin-1")
+    named = re.search(pattern, header, re.IGNORECASE | re.MULTILINE)
+    if named is None or named[1].upper() == "LOCAL":
+        return path
+    if re.match(r"LIST\b|.*%", named[1]):
+        raise ConfigError(
+            f"{path} has its voxels in several files ({named[1]}), 1 is needed: save it as one file"
+        )
+    data = path.parent / named[1]
+    if not data.is_file():
+        raise ConfigError(f"{path} names {named[1]}, which was not found beside it: copy it there")
+    return data
 
 
 def scan_files(path: str) -> list[str]:
@@ -215,7 +234,12 @@ def scan_files(path: str) -> list[str]:
     Raises ConfigError when there is none."""
     place = Path(path)
     if place.is_file():
-        return list(dict.fromkeys((path, str(header_data(place)))))
+        try:
+            return list(dict.fromkeys((path, str(voxel_file(place)))))
+        except OSError as error:
+            raise ConfigError(
+                f"{path} cannot be read ({error.strerror}): make it readable"
+            ) from error
     everything = place.suffix == ".zarr"
     slices = [
         file

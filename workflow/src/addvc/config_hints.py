@@ -34,7 +34,7 @@ def list_hint(value, schema: dict) -> str:
 def limit_hint(key: str, value) -> str:
     """A guess where a value is beyond its limit: a share in per cent, a voxel in another unit, pairs in
     one list."""
-    if key == "scans.crop" and isinstance(value, list) and len(value) == 6:
+    if key == "scans.crop" and isinstance(value, list) and len(value) == 6 and is_flat(value):
         return f" (did you mean {[value[:2], value[2:4], value[4:]]}?)"
     if not isinstance(value, int | float):
         return ""
@@ -45,6 +45,10 @@ def limit_hint(key: str, value) -> str:
             if LIKELY_UM[0] <= value * factor <= LIKELY_UM[1]:
                 return f" ({value:g} {unit}? that is {value * factor:g})"
     return ""
+
+
+def is_flat(values: list) -> bool:
+    return all(isinstance(value, int) for value in values)
 
 
 def is_text(value) -> bool:

@@ -8,6 +8,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator, Mapping
+from numbers import Integral, Real
 from pathlib import Path
 
 from addvc.errors import MARK, AddvcError
@@ -81,10 +82,10 @@ def _flat(figures: Mapping, lead: str = "") -> Iterator[tuple[str, str]]:
     for key, value in figures.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{lead}{key}.")
-        elif isinstance(value, float):
-            yield f"{lead}{key}", f"{value:.4g}"
-        elif isinstance(value, bool | int | str):
+        elif isinstance(value, Integral | str):  # truth values are among them
             yield f"{lead}{key}", str(value)
+        elif isinstance(value, Real):
+            yield f"{lead}{key}", f"{value:.4g}"
 
 
 @contextlib.contextmanager

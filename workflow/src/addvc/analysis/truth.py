@@ -19,18 +19,15 @@ def load_truth(path: str | Path) -> Judge:
     return MeshTruth.load(path) if is_mesh_truth(path) else Truth.load(str(path))
 
 
-def judged_nodes(
-    cells: np.ndarray, penalised: np.ndarray, torn: Iterable[Sequence[int]]
-) -> np.ndarray:
+def judged_nodes(cells: np.ndarray, penalised: np.ndarray, torn: Sequence[int]) -> np.ndarray:
     """Nodes (n,) bool of the micro mesh that all results of a state are judged at: in the bulk, not
-    `penalised` (n,), and of no cell that a result says is torn.
+    `penalised` (n,), and of no cell that micro DVC says is torn.
 
     The place of a break is known to a voxel, and the truth jumps there: in the solid twin at 15 % by
     9 voxels from one node to the next, where 2 of 48,212 nodes, on the wrong side, are a fifth of the
     mean square of the error normal to the struts."""
     judged = penalised == 0
-    for layer in torn:
-        judged[cells[list(layer)]] = False
+    judged[cells[list(torn)]] = False
     return judged
 
 

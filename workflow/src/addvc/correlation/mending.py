@@ -116,9 +116,11 @@ def helpful_cuts(
     scale: float | None,
     limit: float,
 ) -> tuple[list[Joint], list[Step]]:
-    """The stages in which what is in doubt is carried; with the bridges cut that are in doubt (over
-    `limit`, grey levels) after them, and these bridges, if that explains the images near them better.
-    What is not taken leaves no trace in the history."""
+    """The bridges to cut, and the stages that `carry` what is in doubt with them cut; none, and those of
+    the problem as it is, unless cuts explain the images near them better.
+
+    On trial are the bridges still in doubt (over `limit`, grey levels) once carried whole. What is not
+    taken leaves no trace in the history."""
     mesh, whole = problem.reference.mesh, carry(problem)
     still = doubtful_nodes(problem.reference, deformed, whole[-1][0].u, limit)
     cuts = torn_joints(mesh, problem.joints, still)

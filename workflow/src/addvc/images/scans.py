@@ -174,7 +174,8 @@ def read_binned(
 
     crop: ((x0, x1), (y0, y1), (z0, z1)) in voxels of the scan, python slices, None for all.
     progress(done, total): called after each slab with numbers of slices. One slab is in memory at
-    a time. Raises ScanError for NaN or infinite values and for a constant image.
+    a time, or the whole of a file that cannot be read in parts. Raises ScanError for NaN or infinite
+    values and for a constant image.
     """
     shape = binned_shape(scan, factor, crop)
     bounds = crop_bounds(scan.shape, crop)

@@ -46,6 +46,7 @@ def check_headers(config: dict) -> str:
         name = f"scans.states[{number - 1}]" if number else "scans.reference"
         try:
             files = tuple(os.path.realpath(file) for file in scan_files(path))
+            files = files[-1:] if os.path.isfile(path) else files  # the voxels, not their header
             if files in names:
                 problems.append(
                     f"{name} is the same scan as {names[files]}, {path}; list each scan once"

@@ -2,7 +2,7 @@
 
 Every opener maps (path, format) to a `Source`, still in the file's own axis order, slowest first;
 `scans.open_scan` turns that into (x, y, z). Readers open their file anew for each slab, so that no
-memory map or handle outlives it.
+memory map or handle outlives it, but for formats that cannot be read in parts (`scans_itk`).
 """
 
 import glob

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from addvc.config import header_data
-from addvc.errors import ScanError
+from addvc.config import HEADER_BYTES, voxel_file
+from addvc.errors import ConfigError, ScanError
 from addvc.images.scans_formats import ScanFormat, Source
 
 if TYPE_CHECKING:
@@ -21,10 +21,8 @@ T = TypeVar("T")
 
 SUFFIXES = (".nrrd", ".nhdr", ".mha", ".mhd", ".nii", ".gz")
 
-PACKED = re.compile(rb"^(CompressedData *= *True|encoding: *(?!raw)\w)", re.MULTILINE)
+PACKED = re.compile(rb"^(CompressedData\s*=\s*True|encoding:\s*(?!raw)\w)", re.MULTILINE | re.I)
 """How the header of a MetaImage or NRRD file says that its voxels are compressed."""
-
-HEADER_BYTES = 4096
 
 
 def open_itk(path: Path, fmt: ScanFormat) -> Source:
@@ -34,6 +32,7 @@ def open_itk(path: Path, fmt: ScanFormat) -> Source:
     ScanError when the file cannot be read or is truncated, or its voxels are colours or vectors."""
     import SimpleITK as sitk  # slow to load, and most runs do without
 
+    data = _voxels_of(path)
     reader = _reader(path)
     _run(path, reader.ReadImageInformation)
     if reader.GetNumberOfComponents() != 1:
@@ -44,24 +43,46 @@ def open_itk(path: Path, fmt: ScanFormat) -> Source:
     size = reader.GetSize()
     blank = sitk.Image([1] * len(size), reader.GetPixelID())
     dtype = sitk.GetArrayViewFromImage(blank).dtype
-    data, packed = header_data(path), _packed(path)
-    if not packed:
-        _check_length(data, int(np.prod(size)) * dtype.itemsize)
-    in_parts = not packed and path.suffix.lower() not in (".nrrd", ".nhdr")
-    whole: list[NDArray] = []
+    held: list[sitk.Image] = []
 
-    def read(start: int, stop: int) -> NDArray:
-        if in_parts:
-            part = _reader(path)
-            part.SetExtractIndex([0] * (len(size) - 1) + [start])
-            part.SetExtractSize([*size[:-1], stop - start])
-            return sitk.GetArrayFromImage(_run(path, part.Execute))
-        if not whole:
+    def slices(start: int, stop: int) -> NDArray:
+        part = _reader(path)
+        part.SetExtractIndex([0] * (len(size) - 1) + [start])
+        part.SetExtractSize([*size[:-1], stop - start])
+        return sitk.GetArrayFromImage(_run(path, part.Execute))
+
+    def slices_of_all(start: int, stop: int) -> NDArray:
+        if not held:
             _check_gzip(path)
-            whole.append(sitk.GetArrayFromImage(_run(path, _reader(path).Execute)))
-        return whole[0][start:stop]
+            held.append(_run(path, _reader(path).Execute))
+        return sitk.GetArrayViewFromImage(held[0])[start:stop]
 
-    return Source(tuple(size[::-1]), dtype, read, tuple(dict.fromkeys((path, data))))
+    files = tuple(dict.fromkeys((data, path)))
+    if not is_held(path):
+        slices(size[-1] - 1, size[-1])  # the end of a truncated file is missing
+        return Source(tuple(size[::-1]), dtype, slices, files)
+    if not _packed(path):
+        _check_length(data, int(np.prod(size)) * dtype.itemsize)
+    return Source(tuple(size[::-1]), dtype, slices_of_all, files)
+
+
+def is_held(path: Path) -> bool:
+    """Whether a scan cannot be read in parts: one of NRRD, or with compressed voxels."""
+    return path.suffix.lower() in (".nrrd", ".nhdr") or _packed(path)
+
+
+def _voxels_of(path: Path) -> Path:
+    """The file that has the voxels, which can be read."""
+    if path.suffix.lower() == ".gz" and not path.name.lower().endswith(".nii.gz"):
+        raise ScanError(f"{path}: of packed files .nii.gz is known only; unpack it")
+    try:
+        data = voxel_file(path)
+        with data.open("rb"):
+            return data
+    except OSError as error:
+        raise ScanError(f"{path}: cannot be read ({error.strerror}); make it readable") from error
+    except ConfigError as error:
+        raise ScanError(str(error)) from error
 
 
 def _reader(path: Path) -> "sitk.ImageFileReader":

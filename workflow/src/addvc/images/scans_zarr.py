@@ -1,5 +1,6 @@
 """Zarr scans: an array, or a group with one or more of them."""
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -8,32 +9,48 @@ from numpy.typing import NDArray
 from addvc.errors import ScanError
 from addvc.images.scans_formats import ScanFormat, Source, only_volume
 
+log = logging.getLogger(__name__)
+
 SUFFIX = ".zarr"
+
+BROKEN = (OSError, ValueError, RuntimeError, KeyError, TypeError)
+"""What zarr raises where it cannot read."""
 
 
 def open_zarr(path: Path, fmt: ScanFormat) -> Source:
     """A folder that zarr wrote; of a group `dataset`, or the one array that has three dimensions.
 
-    A missing chunk reads as the fill value, as Zarr has it. Raises ScanError when the folder is not of
-    zarr, or has no such array, or none is named and it does not hold exactly one volume."""
+    A chunk that is not there reads as the fill value, as Zarr has it, with a warning. Raises ScanError
+    when the folder is not of zarr, has no such array, a chunk is damaged, or no array is named and it
+    does not hold exactly one volume."""
     import zarr  # slow to load, and most runs do without
 
     try:
         found: Any = zarr.open(path, mode="r")
-    except (OSError, ValueError) as error:
+    except BROKEN as error:
         raise ScanError(f"{path}: not a readable Zarr folder ({error}); copy it again") from error
     if isinstance(found, zarr.Group):
         arrays = {name: item for name, item in found.members(max_depth=None)
                   if isinstance(item, zarr.Array)}  # fmt: skip
         volumes = [name for name, item in arrays.items() if item.ndim == 3]
-        name = fmt.dataset or only_volume(path, volumes)
+        name = (fmt.dataset or "").strip("/") or only_volume(path, volumes)
         if name not in arrays:
             names = ", ".join(volumes) or "(none)"
             raise ScanError(f"{path}: no array '{name}'; set scans.dataset to one of: {names}")
         found = arrays[name]
 
+    if found.nchunks_initialized < found.nchunks:
+        words = (
+            "WARNING: %s: %d of %d chunks are there; the others read as %s: copy it again, unless "
+        )
+        words += "it was written so"
+        log.warning(words, path, found.nchunks_initialized, found.nchunks, found.fill_value)
+
     def read(start: int, stop: int) -> NDArray:
-        return found[start:stop]
+        try:
+            return found[start:stop]
+        except BROKEN as error:
+            raise ScanError(f"{path}: a chunk is damaged ({error}); copy it again") from error
 
     files = tuple(sorted(file for file in path.rglob("*") if file.is_file()))
     return Source(found.shape, found.dtype, read, files)

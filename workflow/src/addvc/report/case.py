@@ -17,7 +17,7 @@ from addvc.images.scans_store import load_volume
 from addvc.images.specimen import Specimen
 
 FOLDED = 0.01
-"""Share of elements turned inside out from which on it is told."""
+"""Share of elements turned inside out over which it is told."""
 
 
 class UndeclaredInput(RuntimeError):
@@ -156,7 +156,7 @@ class Case:
         words = self.status(mesh, state) or "converged"
         inverted = load_notes(self.path(f"dvc/{mesh}_state{state}.h5"))["inverted"]
         if inverted > FOLDED:
-            words += f", {inverted:.1%} inverted"
+            words += f", {100 * inverted:.1f} % inverted"
         if mesh != self.micro[0] or words == "failed":
             return words
         count = self.flagged(state)

@@ -83,8 +83,7 @@ def _density_handles(case: Case) -> list:
     if any(case.status(name, n) for name in (case.finest, *case.micro) for n in case.states):
         lines.append(style.line("k", "failed or not converged", "--"))
     if known := _noise_stds(case):
-        span = f"{min(known):.2f} to {max(known):.2f}" if len(known) > 1 else f"{known[0]:.2f}"
-        lines.append(style.line(style.DARK, f"noise alone, σ = {span}", ":"))
+        lines.append(style.line(style.DARK, f"noise alone, σ = {max(known):.2f}", ":"))
     return lines
 
 

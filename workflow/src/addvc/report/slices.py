@@ -28,8 +28,9 @@ def show_slice(ax: Axes, plane: np.ndarray, limits: tuple[float, float]) -> None
 
 def slab_across(ax: Axes, volume: np.ndarray, specimen: Specimen, thickness: int) -> None:
     """The brightest voxels of a slab across the loading axis in the middle of the specimen."""
-    first = round((specimen.low + specimen.high - thickness) / 2)
-    plane = volume.take(range(first, first + thickness), axis=specimen.axis).max(axis=specimen.axis)
+    first = max(round((specimen.low + specimen.high - thickness) / 2), 0)
+    slab = np.moveaxis(volume, specimen.axis, 0)[first : first + thickness]
+    plane = slab.max(axis=0)
     show_slice(ax, plane, tuple(np.percentile(plane, (0.5, 99.8))))
     ax.set_axis_off()
 

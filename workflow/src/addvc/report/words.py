@@ -35,11 +35,12 @@ REASONS = {
 }
 
 TERMS = (
-    "A node is *valid* where the residual around it is what noise explains, else *in doubt* (`valid` 0 "
-    "in the files). A strut is *flagged* where the threshold broke it, most of it is in doubt, it lies "
-    "far from equilibrium, or moves unlike a beam (`flag` in the table of struts). A state is "
-    "*converged* where the loop ended and at most 5 % of the nodes are in doubt; *inverted* in a title "
-    "of a figure: the share of elements that a displacement turns inside out, where it is over 1 %."
+    "A node is *valid* where the residual around it is what noise explains, off torn bridges, else "
+    "*in doubt* (`valid` 0 in the files). A strut is *flagged* where the threshold broke it, over 30 % "
+    "of it is in doubt, it lies far from equilibrium, or moves unlike a beam (`flag` in the table of "
+    "struts). A state is *converged* where the loop ended and at most 5 % of the nodes are in doubt; in "
+    "figures that is said of the loop alone, and *inverted* is the share of elements that a "
+    "displacement turns inside out, where it is over 1 %."
 )
 """What the first page means by the words of its verdicts."""
 
