@@ -151,9 +151,21 @@ def test_suffixes_of_slices_may_be_capitals(scans):
     assert settings.scan_files(str(scans / "b")) == [str(scans / "b/S1.TIF")]
 
 
-@pytest.mark.parametrize("name", ["two.raw", "a/t*.tif", "empty"])
-def test_a_missing_scan_is_told_with_its_place(scans, name):
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("empty", "is a folder without TIFF slices .0; at least 1.: name the file"),
+        ("One.raw", r"did you mean .*one\.raw\?"),
+    ],
+)
+def test_a_scan_that_is_hard_to_find_has_a_hint(scans, name, message):
     (scans / "empty").mkdir()
+    with pytest.raises(ConfigError, match=message):
+        settings.scan_files(str(scans / name))
+
+
+@pytest.mark.parametrize("name", ["two.raw", "a/t*.tif"])
+def test_a_missing_scan_is_told_with_its_place(scans, name):
     with pytest.raises(ConfigError, match=r"was not found \(0 files; at least 1\)") as told:
         settings.scan_files(str(scans / name))
     assert name in str(told.value)

@@ -100,6 +100,12 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         (scans(platens=[130, 10]), r"scans.platens is \[130, 10\]; give \[LOW, HIGH\]"),
         (scans(platens="both"), "it must be auto, none or a list"),
         (scans(crop=[0, 9, 0, 9, 0, 9]), r"mean \[\[0, 9\], \[0, 9\], \[0, 9\]\]\?"),
+        (
+            {"geometry": {"threshold": float("nan")}},
+            "`geometry.threshold` is nan; give a finite number",
+        ),
+        (scans(states=[]) | {"virtual": {"strains": [2]}}, r"at most 0.3 \(did you mean 0.02\?\)"),
+        ({"axes": "xyz"}, "unknown key `axes`: did you mean `scans.axes`?"),
         (scans(crop=[None, [9, 3], None]), "scans.crop of y is 9 to 3; use START < STOP"),
         ({"geometry": {"cell_size": "1.2mm"}}, r"auto or a number \(write 1.2, without its unit\)"),
         (

@@ -91,7 +91,7 @@ NAMES += ["a.mhd", "packed.mhd", "a.nii", "a.nii.gz"]
 @pytest.mark.parametrize("name", NAMES)
 def test_every_format_gives_the_same_voxels(tmp_path, volume, pages, name):
     write(tmp_path / name, pages)
-    scan = open_scan(tmp_path / name, RAW)
+    scan = open_scan(tmp_path / name, RAW if name.startswith("scan.") else None)
     assert (scan.shape, scan.slow_axis, scan.path) == (SHAPE, 2, tmp_path / name)
     assert scan.dtype == np.uint16 or scan.dtype == np.dtype(">u2")
     assert_array_equal(scan.slab(9, 12), volume[:, :, 9:12])
@@ -118,6 +118,12 @@ def test_pattern_sorts_numbers_naturally(tmp_path, volume, pages):
     write_stack(tmp_path / "stack", pages)
     tifffile.imwrite(tmp_path / "stack" / "preview.tif", pages[0, :5])
     assert_array_equal(read_binned(open_scan(tmp_path / "stack" / "scan_*.tif")), volume)
+
+
+def test_keys_of_another_format_are_not_left_aside(tmp_path, pages):
+    np.save(tmp_path / "a.npy", pages)
+    expect("scans.shape and dtype are for raw files; leave them out", tmp_path / "a.npy", RAW)
+    expect("scans.dataset is for HDF5 and Zarr", tmp_path / "a.npy", ScanFormat(dataset="a"))
 
 
 @pytest.mark.parametrize("order", ["little", "big"])

@@ -513,6 +513,10 @@ def test_struts_with_doubtful_nodes_or_a_neck_are_flagged(cut, lattice):
     table = table_under(struts, points, 0.01 * points, valid)
     assert table["valid"] == [1, 0, 0]
     assert table["flag"] == ["none", "residual", "broken"]
+    assert table["bridge"] == [0, 0, 0]
+    bridges = [{"position": struts[1].middle.tolist()}]
+    fields = {"": Measured(points, 0.01 * points, None)}
+    assert strut_table(struts, fields, valid, NU, bridges)["bridge"] == [0, 1, 0]
     assert table["whole"] == [1, 1, 0]
 
 

@@ -182,7 +182,7 @@ def test_closing_lines_tell_how_many_struts_are_flagged():
     flags = {"broken": 8, "residual": 15, "equilibrium": 0, "shape": 0}
     struts = {"valid": 341, "flagged": 23, "flags": flags, "bending_share": 0.7}
     lines = closing_lines(summary(GOOD | {"struts": struts}), "results/foam")
-    assert "23 of 364 struts flagged: 8 broken by the threshold, 15 in doubt" in lines
+    assert "23 of 364 struts flagged: 8 broken at a neck, 15 in doubt" in lines
     struts |= {"valid": 364, "flagged": 0, "flags": dict.fromkeys(flags, 0)}
     assert "0 of 364 struts flagged, " in closing_lines(summary(GOOD | {"struts": struts}), "r")
     assert "struts" not in closing_lines(summary(GOOD | {"struts": None}), "results/foam")

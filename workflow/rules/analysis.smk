@@ -48,6 +48,7 @@ rule image_noise:
     params:
         code=code("analysis/image_noise.py"),
         states=STATES,
+        moves=KIND == "virtual",  # what is in the void moves with the solid
     script:
         "../scripts/analysis/image_noise.py"
 
@@ -396,6 +397,7 @@ rule struts:
         frame=f"{R}/geometry/frame.h5" if EQUILIBRIUM else [],
         noise=f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
         struts=f"{R}/geometry/struts.h5",
+        bridges=f"{R}/geometry/bridges.json",
         field=f"{R}/fields/{MICRO[0]}_state{{state}}.vtu",
         meso=f"{R}/dvc/{FINEST}_on_micro_state{{state}}.h5",
     output:

@@ -44,14 +44,13 @@ def checked_config(config):
                 print(f"WARNING: {words}", file=sys.stderr)
             print(
                 f"addvc: case {config['case']}: {images_words(config)}; "
-                f"the report will be results/{config['case']}/report.html",
+                f"results go to results/{config['case']}/, the last is report.html",
                 file=sys.stderr,
             )
         return [settings.scan_files(path) for path in settings.scan_paths(config)]
     except AddvcError as error:
-        raise WorkflowError(
-            f"Configuration of case {config.get('case')}: {error}"
-        ) from error
+        case = config.get("case", "(none)")
+        raise WorkflowError(f"Configuration of case {case}: {error}") from error
 
 
 SCAN_FILES = checked_config(config)
@@ -67,7 +66,7 @@ MESO = settings.meso_names(config)
 FINEST = MESO[-1]
 METHODS = settings.micro_names(config)
 MICRO = list(METHODS)
-EQUILIBRIUM = config["struts"]["equilibrium"]
+EQUILIBRIUM = config["struts"]["equilibrium"] and KIND != "virtual"  # waves are in none
 STRUT_RESULTS = {  # results that struts are measured on, and how their columns end
     MICRO[0]: "",
     **({f"{MICRO[0]}_raw": "_raw"} if EQUILIBRIUM else {}),

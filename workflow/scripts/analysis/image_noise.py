@@ -11,9 +11,9 @@ with job(snakemake) as log:
     specimen = Specimen.from_dict(read_json(source.specimen))
     gamma = read_json(source.threshold)["threshold"]
     reference, degree = load_coefficients(source.reference)
-    noise = {
-        state: pair_noise(reference, load_coefficients(path)[0], specimen, gamma, degree)
-        for state, path in zip(snakemake.params.states, source.deformed, strict=True)
-    }
+    noise = dict.fromkeys(snakemake.params.states)
+    files = [] if snakemake.params.moves else zip(noise, source.deformed, strict=True)
+    for state, path in files:
+        noise[state] = pair_noise(reference, load_coefficients(path)[0], specimen, gamma, degree)
     log.info("residual of noise alone, grey levels: %s", noise)
     write_json(snakemake.output[0], noise)

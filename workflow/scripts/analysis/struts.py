@@ -10,7 +10,7 @@ from addvc.correlation.micro import turns
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_vtu
 from addvc.fem.mesh import Mesh
-from addvc.images.files import write_json
+from addvc.images.files import read_json, write_json
 
 with job(snakemake) as log:
     source, nu = snakemake.input, snakemake.params.nu
@@ -22,7 +22,7 @@ with job(snakemake) as log:
     held = load_frame(source.frame) if source.frame else None
     fields, balance = micro_fields(held, Measured(points, u, draws), point["valid"], nu)
     fields[MESO] = Measured(points, load_field(source.meso))
-    table = strut_table(struts, fields, point["valid"], nu)
+    table = strut_table(struts, fields, point["valid"], nu, read_json(source.bridges))
     whole = {name: foam(table, end) for name, end in snakemake.params.results.items()}
     notes = {"foam": whole, "equilibrium": balance}
     write_columns(snakemake.output.table, table)

@@ -1,5 +1,6 @@
 """What the configuration means: names and numbers derived from it. No numerics, no imports of them."""
 
+import difflib
 import glob
 import hashlib
 import itertools
@@ -247,8 +248,15 @@ def scan_files(path: str) -> list[str]:
         if file.is_file() and (everything or file.suffix.lower() in (".tif", ".tiff"))
     ]
     found = sorted(map(str, slices)) if place.is_dir() else sorted(glob.glob(path))
+    if place.is_dir() and not found:
+        raise ConfigError(
+            f"scan {path} is a folder without TIFF slices (0; at least 1): name the file"
+        )
     if not found:
         hint = "curly quotes around it? " if re.search("[\u2018-\u201f]", path) else ""
+        beside = [str(file) for file in place.parent.glob("*")] if place.parent.is_dir() else []
+        near = difflib.get_close_matches(path, beside, 1, 0.8)
+        hint += f"did you mean {near[0]}? " if near else ""
         raise ConfigError(
             f"scan {path} was not found (0 files; at least 1); {hint}paths start at {Path.cwd()}: "
             "correct scans.reference or scans.states"

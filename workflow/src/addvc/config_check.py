@@ -48,7 +48,7 @@ def key_faults(config: dict, schema: dict, path: str = "") -> Iterator[str]:
     known = schema.get("properties", {})
     for key, value in config.items():
         if key not in known:
-            near = nearest(str(key), known)
+            near = inner_key(str(key), known) or nearest(str(key), known)
             hint = f"did you mean `{path}{near}`?" if near else "see config/README.md."
             yield f"unknown key `{path}{key}`: {hint} Known here: {', '.join(known)}"
         elif isinstance(value, dict):
@@ -56,6 +56,12 @@ def key_faults(config: dict, schema: dict, path: str = "") -> Iterator[str]:
             inner = next((option for option in options if "properties" in option), None)
             if inner:
                 yield from key_faults(value, inner, f"{path}{key}.")
+
+
+def inner_key(word: str, known: dict) -> str | None:
+    """Where a word is a key of a section: `scans.axes`; None if it is none."""
+    sections = (name for name in known if word in known[name].get("properties", {}))
+    return next((f"{name}.{word}" for name in sections), None)
 
 
 def nearest(word: str, known) -> str | None:

@@ -38,7 +38,7 @@ def limit_hint(key: str, value) -> str:
         return f" (did you mean {[value[:2], value[2:4], value[4:]]}?)"
     if not isinstance(value, int | float):
         return ""
-    if key == "porosity" and 1 < value < 100:
+    if (key == "porosity" or ".strains[" in key) and 1 < value < 100:
         return f" (did you mean {value / 100:g}?)"
     if key == "scans.voxel_size_um":
         for unit, factor in UNITS.items():

@@ -1,5 +1,7 @@
 """What does not go together in a configuration, or is out of what a foam can be."""
 
+import math
+
 from addvc import config as settings
 from addvc.errors import ConfigError
 
@@ -17,6 +19,7 @@ def pair_faults(config: dict, told: bool = False) -> list[str]:
         check_twin,
         check_porosity,
         check_region,
+        check_finite,
         check_platens,
         check_crop,
         settings.truth_file,
@@ -82,6 +85,15 @@ def check_region(config: dict) -> None:
         raise ConfigError(
             f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
         )
+
+
+def check_finite(config: dict, path: str = "") -> None:
+    """ConfigError for nan and infinity, which pass every limit."""
+    for key, value in config.items():
+        if isinstance(value, dict):
+            check_finite(value, f"{path}{key}.")
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise ConfigError(f"`{path}{key}` is {value}; give a finite number")
 
 
 def check_crop(config: dict) -> None:

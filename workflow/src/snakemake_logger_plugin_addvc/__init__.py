@@ -45,7 +45,7 @@ CONFIGURATION = "Configuration of case "
 STUDIES = ("ablation", "sensitivity")
 """Targets with a name."""
 
-TARGETS = "A target is `ablation`, `sensitivity` or a file below results/CASE: see ./addvc help."
+TARGETS = "A target is `ablation`, `sensitivity`, a figure (`fig15`) or a file below results/CASE."
 """What may stand after `./addvc run`."""
 
 STOPPING = "Terminating processes on user request"

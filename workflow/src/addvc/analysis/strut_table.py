@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from addvc.analysis.strut_energy import KINDS, StrutEnergy, strut_energy
@@ -33,6 +34,7 @@ GEOMETRY = {
     "junction_a": ("–", "number of the junction at the first end, -1 for none"),
     "junction_b": ("–", "number of the junction at the second end, -1 for none"),
     "neighbours": ("–", "rows (from 0) of the struts that share a junction with it"),
+    "bridge": ("–", "1: the threshold had broken it, mesh.mend has put a rod into it; 0: it has not"),
     "valid": ("–", "1: measured, whole or not, its residual small, near equilibrium; 0: flagged"),
     "flag": ("–", "why it is flagged: broken (by the threshold), residual (its nodes are in doubt), "
                   "equilibrium (far from that), shape (no motion of a beam); none: it is not"),
@@ -76,11 +78,15 @@ class Measured:
 
 
 def strut_table(
-    struts: list[Strut], fields: dict[str, Measured], valid: np.ndarray, nu: float
+    struts: list[Strut],
+    fields: dict[str, Measured],
+    valid: np.ndarray,
+    nu: float,
+    bridges: Sequence[dict] = (),
 ) -> dict[str, list]:
     """Columns by name: the geometry, and the mechanics under each displacement of the micro nodes,
     whose names end in the keys of `fields`; the first is what `valid` (n,) of the nodes judges. nu:
-    Poisson's ratio of the solid."""
+    Poisson's ratio of the solid; rows of bridges.json."""
     broken = np.array([strut.broken for strut in struts], dtype=bool)
     doubtful = np.array([not valid_strut(valid[s.nodes], s.weight) for s in struts], dtype=bool)
     away = astray(struts, fields[""], fields[RAW]) if RAW in fields else np.zeros_like(broken)
@@ -91,8 +97,19 @@ def strut_table(
         columns |= {name + suffix: values for name, values in found.items()}
     shapeless = ~np.isfinite(columns["bending_share"])
     flags = np.select([broken, doubtful, away, shapeless], FLAGS, UNFLAGGED)
-    judged = {"valid": list((flags == UNFLAGGED).astype(int)), "flag": list(flags)}
+    judged = {
+        "bridge": bridged(struts, next(iter(fields.values())).points, bridges),
+        "valid": list((flags == UNFLAGGED).astype(int)),
+        "flag": list(flags),
+    }
     return geometry(struts) | judged | columns
+
+
+def bridged(struts: list[Strut], points: np.ndarray, bridges: Sequence[dict]) -> list[int]:
+    """1 for each strut that has the node of the mesh (n, 3) nearest to the middle of a bridge, or 0."""
+    places = np.array([bridge["position"] for bridge in bridges]).reshape(-1, 3)
+    nodes = cKDTree(points).query(places)[1]
+    return [int(np.isin(nodes, strut.nodes).any()) for strut in struts]
 
 
 def astray(struts: list[Strut], balanced: Measured, measured: Measured) -> np.ndarray:
@@ -103,8 +120,8 @@ def astray(struts: list[Strut], balanced: Measured, measured: Measured) -> np.nd
 
 
 def geometry(struts: list[Strut]) -> dict[str, list]:
-    """The columns that do not depend on the displacement, but for `valid` and `flag`."""
-    names = [name for name in GEOMETRY if name not in ("valid", "flag")]
+    """The columns that the struts alone tell."""
+    names = [name for name in GEOMETRY if name not in ("bridge", "valid", "flag")]
     if not struts:
         return {name: [] for name in names}
     rows = []

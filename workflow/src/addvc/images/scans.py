@@ -119,6 +119,7 @@ def _open_source(path: Path, fmt: ScanFormat, every_slice: bool) -> Source:
         files = [file for file in path.iterdir() if file.suffix.lower() in TIFF_SUFFIXES]
         files = [file for file in files if not file.name.startswith(".")]
         return open_stack(files, str(path), every_slice)
+    _check_keys(path, fmt)
     opener = OPENERS.get(path.suffix.lower())
     if opener is None:
         known = ", ".join(OPENERS)
@@ -127,6 +128,18 @@ def _open_source(path: Path, fmt: ScanFormat, every_slice: bool) -> Source:
             "or a pattern such as 'scan_*.tif'"
         )
     return opener(path, fmt)
+
+
+def _check_keys(path: Path, fmt: ScanFormat) -> None:
+    """ScanError for keys that a format has no use for, and that would be left aside without a word."""
+    suffix = path.suffix.lower()
+    wrong = []
+    if fmt.dataset is not None and suffix not in (".h5", ".hdf5", ZARR_SUFFIX):
+        wrong.append("scans.dataset is for HDF5 and Zarr")
+    if (fmt.shape or fmt.dtype) and OPENERS.get(suffix, open_raw) is not open_raw:
+        wrong.append("scans.shape and dtype are for raw files")
+    if wrong:
+        raise ScanError(f"{path}: {'; '.join(wrong)}; leave them out for a {suffix} file")
 
 
 def crop_bounds(shape: Sequence[int], crop: Crop) -> list[tuple[int, int]]:

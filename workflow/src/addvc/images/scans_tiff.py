@@ -69,7 +69,8 @@ def _check_numbers(files: Sequence[Path], name: str) -> None:
         at = int(np.argmax(steps))
         raise ScanError(
             f"{name}: slice numbers go from {numbers[at]} to {numbers[at + 1]} where others go up "
-            f"by {steps.min()}; put the missing files back, or renumber what is there"
+            f"by {steps.min()}; put the missing files back, or renumber what is there (a folder or a "
+            "pattern is one scan: list several scans one by one)"
         )
 
 

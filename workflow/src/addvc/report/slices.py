@@ -60,8 +60,7 @@ def _grid_over_slice(ax: Axes, volume: np.ndarray, specimen: Specimen, nodes: np
     normal, other = specimen.across
     plane = np.take(volume, volume.shape[normal] // 2, axis=normal)
     plane = plane if other < specimen.axis else plane.T  # (other, loading axis)
-    foam = plane[:, int(specimen.low) + 3 : int(specimen.high) - 2]
-    show_slice(ax, plane, tuple(np.percentile(foam, (0.5, 99.8))))
+    show_slice(ax, plane, tuple(np.percentile(plane, (0.5, 99.9))))
     across, along = np.unique(nodes[:, other]), np.unique(nodes[:, specimen.axis])
     ax.vlines(across, along[0], along[-1], color="#5aa9ff", lw=1.2)
     ax.hlines(along, across[0], across[-1], color="#5aa9ff", lw=1.2)
@@ -71,8 +70,6 @@ def _grid_over_slice(ax: Axes, volume: np.ndarray, specimen: Specimen, nodes: np
         ax.axhline(face, color=style.ORANGE, lw=1.2, ls="--")
         words = {"color": style.ORANGE, "fontsize": 8, "fontweight": "bold"}
         ax.text(0.02 * plane.shape[0], face + shift, "platen", va=side, **words)
-        end = along[0] if side == "top" else along[-1]
-        ax.fill_between(across[[0, -1]], face, end, color=style.ORANGE, alpha=0.15, lw=0)
     ax.set_axis_off()
 
 

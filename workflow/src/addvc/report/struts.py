@@ -61,7 +61,7 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     style.scale_bar(axes[1, 0], case.voxel_um, 0.4)
     style.axis_arrows(axes[1, 1], view.right, view.up)
     handles = [
-        Patch(color=style.DOUBT, label="in doubt"),
+        Patch(color=style.DOUBT, label="flagged"),
         Patch(color=NO_VALUE, label="no value"),
         Patch(color=GREY, label="junction"),
     ]

@@ -122,9 +122,12 @@ def zoom(case: Case, outputs: Iterable[str]) -> None:
             render(layers, view, 55, fit).show(axes[row, column])
             style.headline(axes[row, column], titles[column], 3 * row + column)
         style.scale_bar(axes[row, 0], case.voxel_um)
-        style.axis_arrows(axes[row, -1], view.right, view.up, y=-0.06)
+        style.axis_arrows(axes[row, -1], view.right, view.up, y=-0.08)
     label = case.labels[state]
-    colours = {f"segmented $I_d$, {label}": style.SOLID, "struts of $I_r$, carried": style.RED}
+    colours = {
+        f"segmented $I_d$, {label} (pink over a carried strut)": style.SOLID,
+        "struts of $I_r$, carried": style.RED,
+    }
     handles = [Patch(color=colour, label=label) for label, colour in colours.items()]
     fig.legend(handles=handles, loc="outside lower center", ncols=2)
     style.save(fig, outputs)

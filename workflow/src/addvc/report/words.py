@@ -28,7 +28,7 @@ VERDICTS = {
 }
 
 REASONS = {
-    "broken": "broken by the threshold",
+    "broken": "broken at a neck",
     "residual": "in doubt",
     "equilibrium": "far from equilibrium",
     "shape": "unlike a beam",
@@ -153,7 +153,7 @@ def shown(picture: str | None, summary: dict) -> list[str]:
         return []
     caption = (
         f"Struts coloured by what they undergo, by {micro_name(summary)} (left) and by the finest meso "
-        "result (right): see more_struts among the figures."
+        'result (right): see "network of struts" beyond the paper.'
     )
     address = textwrap.wrap(picture, 1000, initial_indent=".. image:: ", subsequent_indent="   ")
     return ["", *address, "   :width: 450px", "", caption]
@@ -165,12 +165,14 @@ def what_next(summary: dict) -> list[str]:
         return ["List the loaded scans in `scans.states`, and give the same command."]
     name, last = micro_name(summary), summary["states"][-1]["state"]
     return [
-        "- Is it right? Fig. 13: pale everywhere. Fig. 16: the carried struts lie in the outline of the "
-        "image. What is not so is in doubt, above or as `valid` 0 in the files.",
+        "- Is it right? Fig. 13: specks, but no strut of one colour along a flank. Fig. 16: the carried "
+        "struts lie in the outline of the image. What is not so is in doubt, above or `valid` 0 in the "
+        "files. A small residual alone is no merit: a result with more unknowns follows more noise.",
         "- What moved? Fig. 11 and 15, and the scene.",
-        "- How do struts carry the load? more_bending and more_struts among the figures; a row for each "
-        f"strut in ``struts_state{last}.csv``, what its columns mean in ``struts_state{last}.json``.",
-        "- Where does strain gather? more_localisation, and ``cells_state*.csv``.",
+        '- How do struts carry the load? "bending or stretching" and "network of struts" beyond the '
+        f"paper; a row for each strut in ``struts_state{last}.csv``, what its columns mean in "
+        f"``struts_state{last}.json``.",
+        '- Where does strain gather? "strain of cells and its bands", and ``cells_state*.csv``.',
         f"- Your own analysis: ``fields/{name}_state*.vtu`` (ParaView, pyvista, meshio) has "
         "displacement, strain, residual and `valid` of every node; ``summary.json`` all of "
         "the figures of this page.",
@@ -200,7 +202,9 @@ def bridge_words(counts: dict | None) -> list[str]:
     return [
         "",
         f"{count} strut{'s' * (count > 1)} that the threshold had broken or lost, but a lower one shows "
-        f"whole, went into the mesh as {rods} (`mesh.mend`): the figure of its topology shows where.",
+        f'whole, went into the mesh as {rods} (`mesh.mend`): "stubs, necks and welds" beyond the paper '
+        "shows where, `bridge` in the table of struts tells which. Struts flagged as broken are others, "
+        "and rods that hold by less than a quarter of their section.",
     ]
 
 
