@@ -167,6 +167,17 @@ def sensitivity(found: Sequence[dict], label: str, outputs: Iterable[str]) -> No
     style.save(fig, outputs)
 
 
+def apart(ax: Axes, x: Sequence[float], y: Sequence[float], room: float = 0.12) -> list[int]:
+    """Points of a panel, the first of each heap, that are `room` of its width or height apart: words
+    beside them do not run into each other."""
+    places = ax.transLimits.transform(np.column_stack([x, y]))
+    chosen: list[int] = []
+    for n, place in enumerate(places):
+        if all(np.abs(place - places[m]).max() > room for m in chosen):
+            chosen.append(n)
+    return chosen
+
+
 def _l_curve(ax: Axes, rows: list[dict], name: str, number: int) -> None:
     """Residual over seminorm, the value of the length beside each mark."""
     x = [known(row["seminorms"][name]) for row in rows]
@@ -174,13 +185,14 @@ def _l_curve(ax: Axes, rows: list[dict], name: str, number: int) -> None:
     ax.plot(x, y, "-", color=style.DARK, lw=0.9)
     for row, a, b in zip(rows, x, y, strict=True):
         _dot(ax, row, a, b, style.DARK)
-        ax.annotate(f"{row['settings'][name]:.3g}", (a, b), (4, 4), textcoords="offset points",
-                    fontsize=7)  # fmt: skip
     ax.margins(0.16)
     low, high = ax.get_ylim()
     least = 0.1 * abs(high)  # so that nothing does not look like something
     if high - low < least:
         ax.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+    for n in apart(ax, x, y):
+        ax.annotate(f"{rows[n]['settings'][name]:.3g}", (x[n], y[n]), (4, 4), fontsize=7,
+                    textcoords="offset points")  # fmt: skip
     ax.ticklabel_format(axis="y", useOffset=False)
     ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.set(xlabel=SEMINORMS[name], ylabel="σ(r) (grey levels)")
