@@ -87,6 +87,24 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path, pages):
     assert check_headers(config(good)).startswith("1 scan of 34 x 37 x 41 voxels")
 
 
+def test_a_voxel_size_that_the_header_contradicts_is_warned_of(tmp_path, pages):
+    image = sitk.GetImageFromArray(pages)
+    image.SetSpacing((0.018,) * 3)
+    sitk.WriteImage(image, tmp_path / "a.mha")
+    right = config(tmp_path / "a.mha")
+    right["scans"]["voxel_size_um"] = 18.0
+    assert "WARNING" not in check_headers(right)
+    right["scans"]["voxel_size_um"] = 1.8
+    assert "the header has a voxel size of 0.018" in check_headers(right)
+
+
+def test_a_cell_larger_than_half_of_the_image_is_refused(tmp_path, pages):
+    np.save(tmp_path / "a.npy", pages)
+    wrong = config(tmp_path / "a.npy") | {"geometry": {"cell_size": 560}}
+    with pytest.raises(ConfigError, match=r"cell_size is 560 voxels \(at most 17, half of"):
+        check_headers(wrong)
+
+
 def test_two_headers_of_the_same_voxels_are_one_scan(tmp_path, pages):
     sitk.WriteImage(sitk.GetImageFromArray(pages), tmp_path / "a.mhd")
     (tmp_path / "b.mhd").write_text("Comment = b\n" + (tmp_path / "a.mhd").read_text())

@@ -269,11 +269,12 @@ def test_a_state_says_how_well_its_nodes_are_known():
 
 def test_the_front_page_tells_of_a_band():
     band = {"normal": [0, 1, 0], "thickness": 24.6, "angle": 23.9, "flatness": 0.4,
-            "factor": 1.5, "band_strain_share": 0.225, "band_volume_share": 0.131}  # fmt: skip
+            "factor": 1.5, "band_strain_share": 0.225, "bands": 3,
+            "band_volume_share": 0.131}  # fmt: skip
     told = front_page(summary(GOOD | {"cells": band}), CONFIG, SCANS)
     assert (
-        "over 1.5 times the mean strain: 13% of the volume, with 22% of the compression, 25 voxels"
-        in told
+        "Largest of 3 bands of over 1.5 times the mean strain: 13% of the volume, with 22% of the "
+        "compression, 25 voxels" in told
     )
     assert "24 degrees" in told
     lump = front_page(summary(GOOD | {"cells": band | {"flatness": 0.9}}), CONFIG, SCANS)

@@ -12,6 +12,7 @@ from addvc.images.scans import Crop, Scan, ScanFormat, binned_shape, open_scan
 
 FINGERPRINT_BYTES = 2**20
 WHAT = " with the scans"
+UNITS_UM = (1, 1e3, 1e6)  # micrometres, millimetres, metres
 
 
 class Checked(NamedTuple):
@@ -65,7 +66,29 @@ def check_headers(config: dict) -> str:
     check_slab(region, length)
     if isinstance(platens := config["scans"].get("platens"), list):
         given_faces(platens, length)
-    return described(found[0], len(found), voxel_size_um(config), known["bin"])
+    check_cell(config.get("geometry", {}).get("cell_size"), found[0].binned)
+    voxel_um = voxel_size_um(config)
+    said = described(found[0], len(found), voxel_um, known["bin"])
+    return said + spacing_words(found[0].scan.source.spacing, voxel_um)
+
+
+def check_cell(cell_size: str | float | None, shape: tuple[int, ...]) -> None:
+    """ConfigError where `geometry.cell_size` is more than half of an image of this shape (voxels)."""
+    if isinstance(cell_size, int | float) and cell_size > min(shape) / 2:
+        raise ConfigError(
+            f"geometry.cell_size is {cell_size:g} voxels (at most {min(shape) / 2:g}, half of the least "
+            "side of the image once cropped and binned): give it in voxels, not micrometres"
+        )
+
+
+def spacing_words(spacing: float | None, voxel_um: float) -> str:
+    """A warning where the header of a scan has another voxel size, whatever its unit."""
+    if spacing is None or any(abs(spacing * unit / voxel_um - 1) < 0.02 for unit in UNITS_UM):
+        return ""
+    return (
+        f" (WARNING: the header has a voxel size of {spacing:g}, which in no unit is the {voxel_um:g} "
+        "micrometres of scans.voxel_size_um)"
+    )
 
 
 def check_slab(region: str | dict, length: int) -> None:

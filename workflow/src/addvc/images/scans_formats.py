@@ -41,13 +41,15 @@ class ScanFormat:
 class Source:
     """An opened scan in the file's own axis order.
 
-    read(start, stop) -> slices along the first axis, (stop - start, ...); files: what holds them.
+    read(start, stop) -> slices along the first axis, (stop - start, ...); files: what holds them;
+    spacing: edge of a voxel as the header has it, in its own unit, None where it says nothing.
     """
 
     shape: tuple[int, ...]
     dtype: np.dtype
     read: Callable[[int, int], NDArray]
     files: tuple[Path, ...]
+    spacing: float | None = None
 
 
 def is_pattern(path: Path) -> bool:

@@ -58,12 +58,13 @@ def open_itk(path: Path, fmt: ScanFormat) -> Source:
         return sitk.GetArrayViewFromImage(held[0])[start:stop]
 
     files = tuple(dict.fromkeys((data, path)))
+    spacing = None if reader.GetSpacing()[0] == 1 else reader.GetSpacing()[0]
     if not is_held(path):
         slices(size[-1] - 1, size[-1])  # the end of a truncated file is missing
-        return Source(tuple(size[::-1]), dtype, slices, files)
+        return Source(tuple(size[::-1]), dtype, slices, files, spacing)
     if not _packed(path):
         _check_length(data, int(np.prod(size)) * dtype.itemsize)
-    return Source(tuple(size[::-1]), dtype, slices_of_all, files)
+    return Source(tuple(size[::-1]), dtype, slices_of_all, files, spacing)
 
 
 def is_held(path: Path) -> bool:

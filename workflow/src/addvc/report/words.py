@@ -40,7 +40,8 @@ TERMS = (
     "of it is in doubt, it lies far from equilibrium, or moves unlike a beam (`flag` in the table of "
     "struts). A state is *converged* where the loop ended and at most 5 % of the nodes are in doubt; in "
     "figures that is said of the loop alone, and *inverted* is the share of elements that a "
-    "displacement turns inside out, where it is over 1 %."
+    "displacement turns inside out, where it is over 1 %. The compression measured is by how "
+    "much the end faces of the finest mesh of meso DVC come nearer, over their distance."
 )
 """What the first page means by the words of its verdicts."""
 
@@ -260,7 +261,8 @@ def band_words(cells: dict | None) -> str:
         else "a lump rather than a plate"
     )
     return (
-        f" Largest band of over {cells['factor']:g} times the mean strain: "
+        f" Largest of {cells['bands']} band{'s' * (cells['bands'] > 1)} of over "
+        f"{cells['factor']:g} times the mean strain: "
         f"{cells['band_volume_share']:.0%} of the volume, with {cells['band_strain_share']:.0%} of the "
         f"compression, {shape}."
     )
