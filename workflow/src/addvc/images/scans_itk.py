@@ -3,7 +3,7 @@
 import gzip
 import re
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -26,12 +26,10 @@ PACKED = re.compile(rb"^(CompressedData\s*=\s*True|encoding:\s*(?!raw)\w)", re.M
 
 
 def open_itk(path: Path, fmt: ScanFormat) -> Source:
-    """A .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz file; its voxel size is not used.
+    """A .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz file; its voxel size is told, but not used.
 
     NRRD and compressed files cannot be read in part: they are held whole from the first slab on. Raises
     ScanError when the file cannot be read or is truncated, or its voxels are colours or vectors."""
-    import SimpleITK as sitk  # slow to load, and most runs do without
-
     data = _voxels_of(path)
     reader = _reader(path)
     _run(path, reader.ReadImageInformation)
@@ -40,31 +38,53 @@ def open_itk(path: Path, fmt: ScanFormat) -> Source:
             f"{path}: has {reader.GetNumberOfComponents()} values a voxel (1 is needed); convert it to "
             "grey"
         )
-    size = reader.GetSize()
-    blank = sitk.Image([1] * len(size), reader.GetPixelID())
-    dtype = sitk.GetArrayViewFromImage(blank).dtype
-    held: list[sitk.Image] = []
+    size, dtype = reader.GetSize(), _dtype(reader)
+    if is_held(path):
+        read = _reader_of_all(path)
+        if not _packed(path):
+            _check_length(data, int(np.prod(size)) * dtype.itemsize)
+    else:
+        read = _reader_of_parts(path, size)
+        read(size[-1] - 1, size[-1])  # the end of a truncated file is missing
+    edge = reader.GetSpacing()[0]
+    files = tuple(dict.fromkeys((data, path)))
+    return Source(tuple(size[::-1]), dtype, read, files, None if edge == 1 else edge)
 
-    def slices(start: int, stop: int) -> NDArray:
+
+def _dtype(reader: "sitk.ImageFileReader") -> np.dtype:
+    """The grey type that a reader gives."""
+    import SimpleITK as sitk  # slow to load, and most runs do without
+
+    blank = sitk.Image([1] * reader.GetDimension(), reader.GetPixelID())
+    return sitk.GetArrayViewFromImage(blank).dtype
+
+
+def _reader_of_parts(path: Path, size: Sequence[int]) -> Callable[[int, int], NDArray]:
+    """Slices along the slowest axis; `size`: that of all, the fastest axis first."""
+    import SimpleITK as sitk
+
+    def read(start: int, stop: int) -> NDArray:
         part = _reader(path)
         part.SetExtractIndex([0] * (len(size) - 1) + [start])
         part.SetExtractSize([*size[:-1], stop - start])
         return sitk.GetArrayFromImage(_run(path, part.Execute))
 
-    def slices_of_all(start: int, stop: int) -> NDArray:
+    return read
+
+
+def _reader_of_all(path: Path) -> Callable[[int, int], NDArray]:
+    """Slices of what is read at once, and held."""
+    import SimpleITK as sitk
+
+    held: list[sitk.Image] = []
+
+    def read(start: int, stop: int) -> NDArray:
         if not held:
             _check_gzip(path)
             held.append(_run(path, _reader(path).Execute))
         return sitk.GetArrayViewFromImage(held[0])[start:stop]
 
-    files = tuple(dict.fromkeys((data, path)))
-    spacing = None if reader.GetSpacing()[0] == 1 else reader.GetSpacing()[0]
-    if not is_held(path):
-        slices(size[-1] - 1, size[-1])  # the end of a truncated file is missing
-        return Source(tuple(size[::-1]), dtype, slices, files, spacing)
-    if not _packed(path):
-        _check_length(data, int(np.prod(size)) * dtype.itemsize)
-    return Source(tuple(size[::-1]), dtype, slices_of_all, files, spacing)
+    return read
 
 
 def is_held(path: Path) -> bool:

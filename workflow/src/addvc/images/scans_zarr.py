@@ -2,12 +2,15 @@
 
 import logging
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
 from addvc.errors import ScanError
 from addvc.images.scans_formats import ScanFormat, Source, only_volume
+
+if TYPE_CHECKING:
+    import zarr
 
 log = logging.getLogger(__name__)
 
@@ -30,21 +33,13 @@ def open_zarr(path: Path, fmt: ScanFormat) -> Source:
     except BROKEN as error:
         raise ScanError(f"{path}: not a readable Zarr folder ({error}); copy it again") from error
     if isinstance(found, zarr.Group):
-        arrays = {name: item for name, item in found.members(max_depth=None)
-                  if isinstance(item, zarr.Array)}  # fmt: skip
-        volumes = [name for name, item in arrays.items() if item.ndim == 3]
-        name = (fmt.dataset or "").strip("/") or only_volume(path, volumes)
-        if name not in arrays:
-            names = ", ".join(volumes) or "(none)"
-            raise ScanError(f"{path}: no array '{name}'; set scans.dataset to one of: {names}")
-        found = arrays[name]
-
-    if found.nchunks_initialized < found.nchunks:
+        found = _chosen(path, found, (fmt.dataset or "").strip("/"))
+    there, chunks = found.nchunks_initialized, found.nchunks
+    if there < chunks:
         words = (
-            "WARNING: %s: %d of %d chunks are there; the others read as %s: copy it again, unless "
+            "WARNING: %s: %d of %d chunks are there (others read as %s); copy it again, or go on"
         )
-        words += "it was written so"
-        log.warning(words, path, found.nchunks_initialized, found.nchunks, found.fill_value)
+        log.warning(words, path, there, chunks, found.fill_value)
 
     def read(start: int, stop: int) -> NDArray:
         try:
@@ -54,3 +49,14 @@ def open_zarr(path: Path, fmt: ScanFormat) -> Source:
 
     files = tuple(sorted(file for file in path.rglob("*") if file.is_file()))
     return Source(found.shape, found.dtype, read, files)
+
+
+def _chosen(path: Path, group: "zarr.Group", dataset: str) -> "zarr.Array":
+    """The array of a group that has this name, or the one volume in it."""
+    arrays = {name: item for name, item in group.members(max_depth=None) if hasattr(item, "chunks")}
+    volumes = [name for name, item in arrays.items() if item.ndim == 3]
+    name = dataset or only_volume(path, volumes)
+    if name not in arrays:
+        names = ", ".join(volumes) or "(none)"
+        raise ScanError(f"{path}: no array '{name}'; set scans.dataset to one of: {names}")
+    return arrays[name]
