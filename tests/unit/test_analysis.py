@@ -5,13 +5,15 @@ import pytest
 
 from addvc.analysis.fields import by_owner, result_fields
 from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_residual
-from addvc.analysis.summary import costs
+from addvc.analysis.summary import costs, scan_noise
 from addvc.analysis.truth import error_statistics, errors_at, judged_nodes, load_truth
 from addvc.analysis.validity import nodal_residual, valid_nodes, verdict
 from addvc.correlation.doubt import LIMIT, nodal_square, residual_limit
 from addvc.correlation.metric import Reference
 from addvc.fem.mesh import Mesh
 from addvc.fem.quadrature import gauss_points
+from addvc.images.levels import bin_mean
+from addvc.images.spline import gaussian_blur
 from addvc.twin.virtual import VirtualField
 
 PAIR = Mesh(np.vstack([np.zeros(3), np.eye(3), np.ones(3)]), [[0, 1, 2, 3], [1, 2, 3, 4]])
@@ -320,3 +322,10 @@ def test_costs_leave_out_what_earlier_configurations_made(tmp_path):
     assert jobs([1, 2], ["micro", "micro-eq10"]) == 4
     assert jobs([1], ["micro", "micro-eq10"]) == 3
     assert jobs([1], ["micro"]) == 2
+
+
+@pytest.mark.parametrize(("blur", "factor"), [(0.0, 1), (0.7, 1), (0.8, 3)])
+def test_the_noise_of_a_scan_is_told_from_that_of_the_blurred_image(blur, factor):
+    noise = np.random.default_rng(2417).normal(0, 5, (40 * factor,) * 3)
+    image = gaussian_blur(bin_mean(noise, factor), blur)[4:-4, 4:-4, 4:-4]
+    assert scan_noise(image.std(), blur, factor) == pytest.approx(5, rel=0.03)

@@ -523,6 +523,8 @@ rule summary:
             "axis": AXIS,
             "truth": HAS_TRUTH,
             "freeform": bool(FREEFORM),
+            "blur": config["images"]["blur"],
+            "bin": settings.scan_settings(config, 0)["bin"],
             "apart": APART,
         },
     script:

@@ -15,6 +15,7 @@ from addvc.analysis.validity import verdict
 from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_vtu
 from addvc.images.files import read_json
+from addvc.images.spline import gaussian_blur
 
 PACKAGES = (
     "snakemake",
@@ -35,14 +36,16 @@ PACKAGES = (
 @dataclass(frozen=True)
 class Scope:
     """What there is to sum up: results from meso to micro, the finest meso mesh, the loading axis,
-    whether there is a truth and a free-form start, rules whose cost does not count since they may
-    run before or after."""
+    whether there is a truth and a free-form start, the pre-filter (voxels) and the binning of scans,
+    rules whose cost does not count since they may run before or after."""
 
     meshes: list[str]
     finest: str
     axis: int
     truth: bool
     freeform: bool
+    blur: float
+    bin: int
     apart: list[str]
 
 
@@ -57,6 +60,7 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
         "threshold": threshold["threshold"],
         "porosity": threshold["porosity"],
         "noise": threshold["noise"],
+        "scan_noise": scan_noise(threshold["noise"], scope.blur, scope.bin),
         "voxel_size_um": scans["binned_voxel_size_um"],
         "meshes": {mesh: mesh_figures(folder, mesh) for mesh in scope.meshes},
         "topology": read("geometry/topology.json")["counts"],
@@ -68,6 +72,14 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
         "versions": {"addvc": __version__, "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
     }
+
+
+def scan_noise(std: float, blur: float, factor: int) -> float:
+    """Standard deviation of the white noise of a scan (grey levels) that is `std` once the scan is
+    binned by `factor` and blurred by `blur` (voxels)."""
+    impulse = np.zeros((33, 33, 33), np.float32)
+    impulse[16, 16, 16] = 1
+    return float(std / np.linalg.norm(gaussian_blur(impulse, blur)) * factor**1.5)
 
 
 def twin_checks(path: str | Path | None) -> dict | None:

@@ -24,9 +24,10 @@ def warnings(summary: dict) -> list[str]:
         found.append(
             "- The error on these images is not known: the residual and the ultimate error "
             "bound it from below only. To measure it for a smooth field on your own reference, put "
-            f"`virtual: {{strains: [0.02, 0.05], noise: {figure(summary.get('noise'), '.3g')}}}` into a "
-            "copy of the configuration (the noise of the binned scan), take `scans.states` out, and "
-            "give it a `case` of its own. Such a field suits coarse meshes; that of struts does not."
+            f"`virtual: {{strains: [0.02, 0.05], noise: {figure(summary.get('scan_noise'), '.3g')}}}` "
+            "into a copy of the configuration (white noise that is as strong once blurred), take "
+            "`scans.states` out, and give it a `case` of its own. Such a field suits coarse meshes, "
+            "that of struts does not."
         )
     found += [
         f"- The synthetic test is not what it claims to be: {check_words(check)}."
