@@ -59,7 +59,7 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
             ax, values = axes[d, column], u[state][:, d]
             render([layer], view, 150 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), d * columns + column)
-            text = f"{style.signed(values.min())} to {style.signed(values.max())}"
+            text = f"{style.signed(values.min())} to {style.signed(values.max())} voxels"
             style.note(ax, text, fontsize=8)
         label = f"$u_{style.AXES[d]}$ ({style.voxels(case.voxel_um)})"
         style.colour_bar(fig, axes[d], norm, cmap, label, shrink=0.85, aspect=18, pad=0.01)
