@@ -99,6 +99,7 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         (scans(crop=[20, 100]), r"`scans.crop` is \[20, 100\]; it must be a list of at least 3\."),
         (scans(platens=[130, 10]), r"scans.platens is \[130, 10\]; give \[LOW, HIGH\]"),
         (scans(platens="both"), "it must be auto, none or a list"),
+        (scans(platens=False), r"none or a list \(write none: YAML takes no for false\)"),
         (scans(crop=[0, 9, 0, 9, 0, 9]), r"mean \[\[0, 9\], \[0, 9\], \[0, 9\]\]\?"),
         (
             {"geometry": {"threshold": float("nan")}},

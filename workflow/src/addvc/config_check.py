@@ -6,7 +6,14 @@ from collections.abc import Iterator
 from jsonschema import Draft202012Validator, ValidationError
 
 from addvc import config as settings
-from addvc.config_hints import alternatives, is_text, limit_hint, list_hint, number_hint
+from addvc.config_hints import (
+    alternatives,
+    is_text,
+    limit_hint,
+    list_hint,
+    no_hint,
+    number_hint,
+)
 from addvc.config_pairs import pair_faults
 from addvc.errors import ConfigError, refuse
 
@@ -109,7 +116,8 @@ def fault_words(error: ValidationError) -> str:
                 return fault_words(inner[0])
             words = alternatives(word for option in limit for word in option_words(option))
             number = any(option.get("type") == "number" for option in limit)
-            return f"`{key}` is {given}; it must be {words}{number_hint(value) if number else ''}"
+            hint = no_hint(value, words) or (number_hint(value) if number else "")
+            return f"`{key}` is {given}; it must be {words}{hint}"
         case "required":
             return f"`{'.'.join(map(str, place(error)))}` is missing"
         case "type":

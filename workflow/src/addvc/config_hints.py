@@ -24,6 +24,11 @@ def number_hint(value) -> str:
     return f" (write {number:g}, without {how})"
 
 
+def no_hint(value, words: str) -> str:
+    """How to say none, where a no stands for it."""
+    return " (write none: YAML takes no for false)" if value is False and "none" in words else ""
+
+
 def list_hint(value, schema: dict) -> str:
     """How a text is written where a list of texts is asked for."""
     items = schema.get("items", {})
