@@ -71,6 +71,10 @@ def write(path, pages):
                 file["entry/data"] = pages
         case "volume.zarr":
             zarr.open_group(path, mode="w").create_array("0/data", data=pages, chunks=(8, 16, 16))
+        case "ome.zarr":
+            levels = zarr.open_group(path, mode="w")
+            levels.create_array("0", data=pages[None, None], chunks=(1, 1, 8, 16, 16))
+            levels.create_array("labels", data=np.zeros((2, *pages.shape), np.uint8))
         case "plain.zarr":
             zarr.save_array(path, pages)
         case "stack":
@@ -84,7 +88,16 @@ def write(path, pages):
 
 NAMES = ["pages.tif", "packed.tiff", "imagej.tif", "big.tif", "plain.TIF", "array.npy"]
 NAMES += ["fortran.npy", "volume.h5", "stack", "scan.raw", "scan.vol", "scan.bin"]
-NAMES += ["volume.zarr", "plain.zarr", "a.nrrd", "packed.nrrd", "a.nhdr", "a.mha", "packed.mha"]
+NAMES += [
+    "volume.zarr",
+    "plain.zarr",
+    "ome.zarr",
+    "a.nrrd",
+    "packed.nrrd",
+    "a.nhdr",
+    "a.mha",
+    "packed.mha",
+]
 NAMES += ["a.mhd", "packed.mhd", "a.nii", "a.nii.gz"]
 
 

@@ -21,7 +21,8 @@ BROKEN = (OSError, ValueError, RuntimeError, KeyError, TypeError)
 
 
 def open_zarr(path: Path, fmt: ScanFormat) -> Source:
-    """A folder that zarr wrote; of a group `dataset`, or the one array that has three dimensions.
+    """A folder that zarr wrote; of a group `dataset`, or the one array that is a volume: of three
+    dimensions, or of more that are 1 (time and channel of OME-Zarr).
 
     A chunk that is not there reads as the fill value, as Zarr has it, with a warning. Raises ScanError
     when the folder is not of zarr, has no such array, a chunk is damaged, or no array is named and it
@@ -41,20 +42,27 @@ def open_zarr(path: Path, fmt: ScanFormat) -> Source:
         )
         log.warning(words, path, there, chunks, found.fill_value)
 
+    more = found.ndim - 3 if is_volume(found) else 0
+
     def read(start: int, stop: int) -> NDArray:
         try:
-            return found[start:stop]
+            return found[(0,) * more + (slice(start, stop),)]
         except BROKEN as error:
             raise ScanError(f"{path}: a chunk is damaged ({error}); copy it again") from error
 
     files = tuple(sorted(file for file in path.rglob("*") if file.is_file()))
-    return Source(found.shape, found.dtype, read, files)
+    return Source(found.shape[more:], found.dtype, read, files)
+
+
+def is_volume(array: "zarr.Array") -> bool:
+    """Whether all dimensions of an array but the last three are 1."""
+    return array.ndim >= 3 and set(array.shape[:-3]) <= {1}
 
 
 def _chosen(path: Path, group: "zarr.Group", dataset: str) -> "zarr.Array":
     """The array of a group that has this name, or the one volume in it."""
     arrays = {name: item for name, item in group.members(max_depth=None) if hasattr(item, "chunks")}
-    volumes = [name for name, item in arrays.items() if item.ndim == 3]
+    volumes = [name for name, item in arrays.items() if is_volume(item)]
     name = dataset or only_volume(path, volumes)
     if name not in arrays:
         names = ", ".join(volumes) or "(none)"
