@@ -128,9 +128,9 @@ def front_page(summary: dict, config: dict, scans: dict, picture: str | None = N
 
 def answer(summary: dict) -> list[str]:
     """What was measured, in a few sentences."""
-    size = summary["voxel_size_um"]
+    size, count = summary["voxel_size_um"], len(summary["states"])
     lines = [
-        f"Displacement of the solid at {len(summary['states'])} loading states. Cell size "
+        f"Displacement of the solid at {count} loading state{'s' * (count != 1)}. Cell size "
         f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
         f"threshold {summary['threshold']:.1f} grey levels for a porosity of "
         f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.",
