@@ -97,6 +97,13 @@ def test_a_title_tells_of_elements_turned_inside_out(case, folder, cube):
     assert case.title(1, "meso9") == "3.4 %: converged, 100.0 % inverted"
 
 
+def test_a_result_looks_alike_in_all_figures():
+    few = style.looks(("meso12",), ("micro",))
+    many = style.looks(("meso33", "meso12"), ("micro", "micro-eq10"), ["freeform"])
+    assert all(few[name]["color"] == many[name]["color"] for name in few)
+    assert len({look["color"] for look in many.values()}) == len(many) == 5
+
+
 def test_labels_survive_keys_that_are_words(folder):
     description = DESCRIPTION | {"labels": {"2": "b", "1": "a"}, "root": folder}
     assert Case.of(description).states == [1, 2]

@@ -198,14 +198,14 @@ def errors(case: Case, outputs: Iterable[str], names: Sequence[str]) -> None:
 
     names: results in the order they are drawn, the free-form start among them."""
     fig, axes = _error_panels(case, names)
-    look = {name: n for n, name in enumerate(dict.fromkeys([*case.meso, *case.micro, *names]))}
+    looks = style.looks(case.meso, case.micro, names)
     for place, name in enumerate(names):
         for column, state in enumerate(case.states):
             found = case.json(f"analysis/error_{name}_state{state}.json")
             x = column + 0.72 * ((place + 0.5) / len(names) - 0.5)
-            _error(axes, x, found, look[name], not case.status(name, state))
+            _error(axes, x, found, looks[name], not case.status(name, state))
     handles = [
-        style.line(style.SERIES[look[name] % 6], name, ls="", marker=style.MARKERS[look[name] % 6])
+        style.line(looks[name]["color"], name, ls="", marker=looks[name]["marker"])
         for name in names
     ]
     handles.append(style.line("#555555", "p95 / along the strut", ls="", marker="_"))
@@ -237,9 +237,9 @@ def _error_panels(case: Case, names: Sequence[str]) -> tuple:
     return fig, axes
 
 
-def _error(axes, x: float, found: dict, place: int, good: bool) -> None:
+def _error(axes, x: float, found: dict, look: dict, good: bool) -> None:
     """Marks of one result in both panels."""
-    colour, marker = style.SERIES[place % 6], style.MARKERS[place % 6]
+    colour, marker = look["color"], look["marker"]
     for ax, main, other in zip(axes, ("rms", "rms_normal"), ("p95", "rms_along"), strict=False):
         if found.get(main) is None:
             continue

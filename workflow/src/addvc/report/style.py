@@ -2,7 +2,7 @@
 
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -28,6 +28,13 @@ SOLID, BLUE, RED, ORANGE, DARK = "#c6ccd3", "#3d86cf", "#c8341f", "#e08214", "#3
 DOUBT = "#d10f9b"  # what is not to be trusted, in maps of any colours
 SERIES = ("#440154", "#31688e", "#35b779", "#e6a000", "#c51b7d", "#7f7f7f")
 MARKERS = "osD^vP"
+OTHERS = (
+    "#5c3a10",
+    "#a0762a",
+    "#762a83",
+    "#1b7837",
+    "#7f7f7f",
+)  # results but finest meso and micro
 AXES = "xyz"
 
 ARROW = 14.0  # length of the arrows along the axes, points
@@ -230,6 +237,18 @@ def save(fig: Figure, outputs: Iterable[str | Path]) -> None:
                 metadata={"Date": None} if vector else {"Software": None},
             )
     plt.close(fig)
+
+
+def looks(meso: Sequence[str], micro: Sequence[str], more: Sequence[str] = ()) -> dict:
+    """Colour and marker of each result by name, the same in all figures: `micro` is blue, the finest
+    meso mesh orange, as where there are only these two."""
+    names = list(dict.fromkeys([*meso, *micro, *more]))
+    known = {micro[0]: BLUE, meso[-1]: ORANGE}
+    rest = dict(zip((n for n in names if n not in known), OTHERS * len(names), strict=False))
+    return {
+        name: {"color": (known | rest)[name], "marker": MARKERS[number % len(MARKERS)]}
+        for number, name in enumerate(names)
+    }
 
 
 def line(colour: str, label: str, ls: str = "-", marker: str = "") -> Line2D:

@@ -18,14 +18,14 @@ def ultimate(case: Case, outputs: Iterable[str]) -> None:
     names = [*case.meso, *case.micro]
     fig = style.figure(68)
     bias, clean, noisy = fig.subplots(1, 3)
-    for number, name in enumerate(names):
+    looks = style.looks(case.meso, case.micro)
+    for name in names:
         figures = case.json(f"analysis/ultimate_{name}.json")
-        colour, marker = style.SERIES[number % 6], style.MARKERS[number % 6]
-        look = {"color": colour, "marker": marker, "ms": 4}
+        look = looks[name] | {"ms": 4}
         _curve(bias, figures["shifts"], "bias", label=name, **look)
         _curve(clean, figures["shifts"], "std", **look)
         _curve(noisy, figures["noisy_shifts"], "std", **look)
-        noisy.axhline(SCALE * figures["a_priori"], color=colour, ls="--", lw=1)
+        noisy.axhline(SCALE * figures["a_priori"], color=look["color"], ls="--", lw=1)
     bias.axhline(0, color="#999999", lw=0.6, zorder=0)
     titles = "without noise", "without noise", "with noise"
     for number, (ax, title) in enumerate(zip((bias, clean, noisy), titles, strict=True)):
