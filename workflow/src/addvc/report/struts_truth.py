@@ -50,7 +50,8 @@ def against_truth(case: Case, outputs: Iterable[str]) -> None:
     axes[0, 0].set_ylabel("share of bending, measured (–)")
     axes[1, 0].set_ylabel("axial strain, measured (%)")
     handles = [style.line(c, n, ls="", marker="o") for n, (_, c) in sources.items()]
-    fig.legend(handles=handles, loc="outside lower center", ncols=2)
+    handles.append(style.line("#777777", "measured as the truth"))
+    fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
 
 
