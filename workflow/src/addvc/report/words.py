@@ -260,9 +260,9 @@ def band_words(cells: dict | None) -> str:
         if cells["flatness"] < LUMP
         else "a lump rather than a plate"
     )
+    which = "One band" if cells["bands"] == 1 else f"Largest of {cells['bands']} bands"
     return (
-        f" Largest of {cells['bands']} band{'s' * (cells['bands'] > 1)} of over "
-        f"{cells['factor']:g} times the mean strain: "
+        f" {which} of over {cells['factor']:g} times the mean strain: "
         f"{cells['band_volume_share']:.0%} of the volume, with {cells['band_strain_share']:.0%} of the "
         f"compression, {shape}."
     )
