@@ -62,7 +62,7 @@ def is_volume(array: "zarr.Array") -> bool:
 def _chosen(path: Path, group: "zarr.Group", dataset: str) -> "zarr.Array":
     """The array of a group that has this name, or the one volume in it."""
     arrays = {name: item for name, item in group.members(max_depth=None) if hasattr(item, "chunks")}
-    volumes = [name for name, item in arrays.items() if is_volume(item)]
+    volumes = sorted(name for name, item in arrays.items() if is_volume(item))
     name = dataset or only_volume(path, volumes)
     if name not in arrays:
         names = ", ".join(volumes) or "(none)"
