@@ -54,8 +54,8 @@ def checked_config(config):
 
 
 SCAN_FILES = checked_config(config)
-WHOLE = (".nrrd", ".nhdr", ".mha", ".mhd", ".gz")  # held whole, or may be compressed
-SCAN_MEMORY = 6.0 if any(str(p[0]).lower().endswith(WHOLE) for p in SCAN_FILES) else 1.0
+HELD = any(files[0].lower().endswith(settings.WHOLE) for files in SCAN_FILES)
+SCAN_MEMORY = 6.0 if HELD else 1.0
 CASE = config["case"]
 KIND = settings.case_kind(config)
 R = f"results/{CASE}"

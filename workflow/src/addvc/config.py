@@ -15,6 +15,12 @@ from addvc.errors import ConfigError
 AXES = {"x": 0, "y": 1, "z": 2}
 NOMINAL_SIZES = [33, 23, 12]  # of the paper, for cells of 28 voxels
 NOMINAL_CELL = 28.0
+TIFF, ZARR = (".tif", ".tiff"), ".zarr"
+"""Suffixes of slices, which a folder may hold, and of a folder that is a scan itself."""
+
+WHOLE = (".nrrd", ".nhdr", ".mha", ".mhd", ".gz")
+"""Suffixes of scans that are read as a whole, or may be, since they may be compressed."""
+
 META_DATA, NRRD_DATA = r"^ElementDataFile\s*=\s*(.+?)\s*$", r"^data ?file\s*:\s*(.+?)\s*$"
 HEADERS = {".mhd": META_DATA, ".mha": META_DATA, ".nhdr": NRRD_DATA, ".nrrd": NRRD_DATA}
 """Scans that may be of two files: how the header names the one with the voxels."""
@@ -241,11 +247,11 @@ def scan_files(path: str) -> list[str]:
             raise ConfigError(
                 f"{path} cannot be read ({error.strerror}): make it readable"
             ) from error
-    everything = place.suffix == ".zarr"
+    everything = place.suffix == ZARR
     slices = [
         file
         for file in (place.rglob("*") if everything else place.glob("[!.]*"))
-        if file.is_file() and (everything or file.suffix.lower() in (".tif", ".tiff"))
+        if file.is_file() and (everything or file.suffix.lower() in TIFF)
     ]
     found = sorted(map(str, slices)) if place.is_dir() else sorted(glob.glob(path))
     if place.is_dir() and not found:

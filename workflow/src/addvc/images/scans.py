@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from addvc.config import TIFF, ZARR
 from addvc.errors import ScanError
 from addvc.images.levels import bin_mean
 from addvc.images.scans_formats import (
@@ -25,9 +26,7 @@ from addvc.images.scans_formats import (
 from addvc.images.scans_itk import SUFFIXES as ITK_SUFFIXES
 from addvc.images.scans_itk import open_itk
 from addvc.images.scans_store import load_volume, save_volume
-from addvc.images.scans_tiff import SUFFIXES as TIFF_SUFFIXES
 from addvc.images.scans_tiff import open_stack, open_tiff
-from addvc.images.scans_zarr import SUFFIX as ZARR_SUFFIX
 from addvc.images.scans_zarr import open_zarr
 
 __all__ = [
@@ -43,12 +42,12 @@ __all__ = [
 Crop = Sequence[Sequence[int | None] | None] | None
 
 OPENERS: dict[str, Callable[[Path, ScanFormat], Source]] = {
-    **dict.fromkeys(TIFF_SUFFIXES, open_tiff),
+    **dict.fromkeys(TIFF, open_tiff),
     **dict.fromkeys((".raw", ".vol", ".bin"), open_raw),
     ".npy": open_npy,
     **dict.fromkeys((".h5", ".hdf5"), open_hdf5),
     **dict.fromkeys(ITK_SUFFIXES, open_itk),
-    ZARR_SUFFIX: open_zarr,
+    ZARR: open_zarr,
 }
 MIN_SIZE = 16  # voxels in each direction after binning
 SLAB_VOXELS = 2**24  # read at once: 64 MB as float32
@@ -115,8 +114,8 @@ def _open_source(path: Path, fmt: ScanFormat, every_slice: bool) -> Source:
     if not path.exists():
         where = "an absolute path" if path.is_absolute() else f"relative to {Path.cwd()}"
         raise ScanError(f"{path}: no such file or folder ({where}); correct the path")
-    if path.is_dir() and path.suffix != ZARR_SUFFIX:
-        files = [file for file in path.iterdir() if file.suffix.lower() in TIFF_SUFFIXES]
+    if path.is_dir() and path.suffix != ZARR:
+        files = [file for file in path.iterdir() if file.suffix.lower() in TIFF]
         files = [file for file in files if not file.name.startswith(".")]
         return open_stack(files, str(path), every_slice)
     _check_keys(path, fmt)
@@ -134,7 +133,7 @@ def _check_keys(path: Path, fmt: ScanFormat) -> None:
     """ScanError for keys that a format has no use for, and that would be left aside without a word."""
     suffix = path.suffix.lower()
     wrong = []
-    if fmt.dataset is not None and suffix not in (".h5", ".hdf5", ZARR_SUFFIX):
+    if fmt.dataset is not None and suffix not in (".h5", ".hdf5", ZARR):
         wrong.append("scans.dataset is for HDF5 and Zarr")
     if (fmt.shape or fmt.dtype) and OPENERS.get(suffix, open_raw) is not open_raw:
         wrong.append("scans.shape and dtype are for raw files")

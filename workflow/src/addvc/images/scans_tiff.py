@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from addvc.errors import ScanError
 from addvc.images.scans_formats import ScanFormat, Source, natural_key
 
-SUFFIXES = (".tif", ".tiff")
 _BROKEN = (tifffile.TiffFileError, ValueError, RuntimeError, OSError, IndexError, zlib.error)
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-SUFFIX = ".zarr"
-
 BROKEN = (OSError, ValueError, RuntimeError, KeyError, TypeError)
 """What zarr raises where it cannot read."""
 
