@@ -163,6 +163,14 @@ def test_scans_that_are_missing_are_told_with_the_other_faults():
         check_config(own(porosity=None, **scans(states=["gone.tif"])), SCHEMA)
 
 
+def test_a_scan_in_the_home_folder_is_there_whatever_else_is_wrong(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "a.tif").touch()
+    with pytest.raises(ConfigError) as told:
+        check_config(own(porosity=None, **scans(reference="~/a.tif", states=[])), SCHEMA)
+    assert "not found" not in str(told.value)
+
+
 def test_a_misspelt_key_that_is_needed_is_told_once():
     given = {"scans": {"reference": "a.tif", "states": ["b.tif"], "voxel_size": 20}}
     with pytest.raises(ConfigError, match=r"^unknown key `scans.voxel_size`: did you mean") as told:

@@ -189,6 +189,15 @@ def test_region_of_a_box_cuts_its_sides():
     assert_allclose(region.bounds, [(5, 17), (2.5, 22.5)])
 
 
+def test_sides_are_cut_or_free_as_is_said():
+    field_of_view = micro_region(CYLINDER, "all", 3.0, "cut")
+    assert (field_of_view.radius, field_of_view.cut_sides) == (CYLINDER.radius - 3, True)
+    own = micro_region(BOX, "all", 3.0, "free")
+    assert not own.cut_sides
+    assert_allclose(own.bounds, [(-1, 23), (-3.5, 28.5)])
+    assert micro_region(BOX, {"radius": 4.0}, 3.0, "free").cut_sides
+
+
 def test_empty_region_is_an_error():
     with pytest.raises(GeometryError, match=r"\(low = 40\) leaves 1.8 voxels .* 8.3 to 41.8"):
         micro_region(CYLINDER, {"low": 40})
@@ -268,6 +277,13 @@ def test_only_the_largest_solid_stays():
     assert figures["kept_fraction"] == pytest.approx(8 / 9, abs=0.02)
     assert np.sum(grey > 65) - np.sum(kept > 65) == figures["dropped_voxels"]
     assert enclosed_volume(marching_cubes(kept, 65)) == pytest.approx(4 / 3 * np.pi * 512, rel=0.03)
+
+
+def test_what_is_dropped_is_below_the_threshold_at_any_grey_level():
+    """Single precision has steps of .004 grey level at 40000."""
+    grey = np.maximum(ball(8.0, (12, 19, 20)), ball(4.0, (33, 19, 20))) + np.float32(39935)
+    kept, figures = largest_component(grey, 40000.003)
+    assert np.sum(grey > 40000.003) - np.sum(kept > 40000.003) == figures["dropped_voxels"] > 0
 
 
 def test_no_solid_is_an_error():

@@ -13,13 +13,13 @@ NOISE = 4.0
 
 @pytest.fixture
 def foam(rng):
-    """foam(share): plates of 200 in void of 20, with noise and platens of 220; `share` is solid."""
+    """foam(share, noise): plates of 200 in void of 20, platens of 220; `share` is solid."""
 
-    def make(share):
+    def make(share, noise=NOISE):
         image = np.full((40, 60, 40), 20.0)
         image[: round(40 * share)] = 200.0
         image[:, :8] = image[:, -8:] = 220.0
-        return (image + NOISE * rng.standard_normal(image.shape)).astype(np.float32)
+        return (image + noise * rng.standard_normal(image.shape)).astype(np.float32)
 
     return make
 
@@ -28,6 +28,13 @@ def foam(rng):
 def test_levels_do_not_depend_on_how_much_is_solid(foam, share):
     levels = grey_levels(foam(share), AXIS)
     assert_allclose([levels.void, levels.solid], [20, 200], atol=0.5)
+
+
+def test_little_solid_in_much_noise_is_found_or_refused(foam):
+    levels = grey_levels(foam(0.03, 30.0), AXIS)
+    assert_allclose([levels.void, levels.solid], [20, 200], atol=6)
+    with pytest.raises(ScanError, match="within 2 deviations of the void"):
+        grey_levels(foam(0.03, 50.0), AXIS)
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(0.8, 12.0), (1.3, -7.0)])

@@ -142,6 +142,11 @@ def test_a_file_without_what_is_needed(tmp_path):
         file["points"] = np.zeros((4, 3))
     with pytest.raises(ConfigError, match=r"has no dataset \['cells', 'displacement1'\]; a truth"):
         load_truth(path)
+    with h5py.File(path, "w") as file:
+        for name in ("points", "cells", "displacement1", "displacement3", "displacement_unit"):
+            file[name] = np.zeros((4, 3))
+    with pytest.raises(ConfigError, match=r"has no dataset \['displacement2'\]"):
+        load_truth(path)
     path.write_text("no HDF5")
     with pytest.raises(ConfigError, match="cannot be read as HDF5"):
         load_truth(path)

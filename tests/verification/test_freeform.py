@@ -182,6 +182,23 @@ def test_platens_give_the_compression_to_begin_with(rng):
     assert_array_equal(u[..., [0, 2]], 0)
 
 
+def test_a_spacing_that_asks_for_too_much_memory_stays_twice_as_large(image, monkeypatch):
+    monkeypatch.setattr(module, "ALWAYS", 500)
+    grid, solution, table = freeform(image, image, OPTIONS)
+    assert [row["spacing"] for row in table] == [32.0, 16.0, 16.0, 16.0, 16.0]
+    assert np.prod(grid.shape) <= 1000 and grid.spacing == 16
+    assert_allclose(solution.u, 0, atol=1e-6)
+
+
+def test_a_platen_that_one_image_alone_shows_has_not_moved(rng):
+    """It comes into the field of view: the end of the reference is no face."""
+    images = [rng.normal(20, 2, (40, 60, 40)).astype(np.float32) for _ in range(2)]
+    for volume in images:
+        volume[:, :10] = 150
+    images[1][:, 52:] = 150
+    assert not affine_start(grid_over(images[0].shape, 8.0), *images, AXIS).any()
+
+
 def test_without_platens_it_begins_at_rest(image):
     assert not affine_start(grid_over(image.shape, 8.0), image, image, AXIS).any()
 

@@ -38,7 +38,9 @@ def checked_config(config):
         if settings.case_kind(config) == "twin":
             config.setdefault("twin", {})
         validate(config, str(SCHEMA))
-        studies.check(config, list(settings.state_labels(config)))
+        states = list(settings.state_labels(config))
+        if states:
+            studies.studied_state(config, states)
         if workflow.is_main_process:
             for words in warnings:
                 print(f"WARNING: {words}", file=sys.stderr)

@@ -73,6 +73,7 @@ rule solid:
     params:
         code=code("geometry/solid.py"),
         micro=section("micro", "region"),
+        sides=config.get("scans", {}).get("sides", "auto"),
         mesh=section("mesh", "min_kept", "mend", "size"),
     script:
         "../scripts/geometry/solid.py"

@@ -13,7 +13,8 @@ from addvc.images.specimen import Specimen
 with job(snakemake):
     smooth, _ = load_volume(snakemake.input.smooth)
     specimen = Specimen.from_dict(read_json(snakemake.input.specimen))
-    region = micro_region(specimen, snakemake.params.micro["region"])
+    setting, sides = snakemake.params.micro["region"], snakemake.params.sides
+    region = micro_region(specimen, setting, sides=sides)
     levels = read_json(snakemake.input.threshold)
     mesh, bridges = snakemake.params.mesh, []
     if mesh["mend"] == "bridge":

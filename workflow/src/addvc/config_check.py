@@ -1,6 +1,7 @@
 """What is wrong with a configuration: all of it at once, each fault with its key, value and remedy."""
 
 import difflib
+import os
 from collections.abc import Iterator
 
 from jsonschema import Draft202012Validator, ValidationError
@@ -197,7 +198,7 @@ def missing_scans(config: dict) -> list[str]:
     faults = []
     for path in filter(is_text, paths):
         try:
-            settings.scan_files(path)
+            settings.scan_files(os.path.expanduser(path))
         except ConfigError as error:
             faults.append(str(error))
     return faults

@@ -118,5 +118,5 @@ def check_platens(config: dict) -> None:
     if "extrapolated" in config.get("meso", {}).get("candidates", []):
         raise ConfigError(
             "scans.platens is none, and `extrapolated` needs the motion of the platens: leave it out of "
-            "meso.candidates, or say where the platens are"
+            "meso.candidates, or give platens: auto"
         )

@@ -9,6 +9,7 @@ the loading axis, the reference first.
 """
 
 import os
+import re
 from functools import cached_property
 
 import h5py
@@ -57,16 +58,17 @@ class MeshTruth:
     def load(cls, path: str | os.PathLike) -> "MeshTruth":
         """From a file of `save_mesh_truth`, or of the user's making.
 
-        Raises ConfigError where points, cells or displacement1 is missing, MeshError where the shapes
-        of these do not fit or a side of a quadratic tetrahedron is not straight."""
+        Raises ConfigError where points, cells or one of displacement1, 2, ... is missing, MeshError
+        where the shapes of these do not fit or a side of a quadratic tetrahedron is not straight."""
         with h5py.File(path) as file:
-            missing = {"points", "cells", "displacement1"} - set(file)
+            count = sum(re.fullmatch(r"displacement\d+", name) is not None for name in file)
+            wanted = {f"displacement{n}" for n in range(1, max(count, 1) + 1)}
+            missing = {"points", "cells", *wanted} - set(file)
             if missing:
                 raise ConfigError(
                     f"truth {path} has no dataset {sorted(missing)}; a truth is a mesh (points, "
                     "cells) with displacement1, displacement2, ...: see workflow/README.md"
                 )
-            count = sum(name.startswith("displacement") for name in file)
             return cls(
                 file["points"][:],
                 file["cells"][:],

@@ -31,7 +31,7 @@ from addvc.correlation.spline_stencil import (
     scalar_product,
     stencil_product,
 )
-from addvc.images.platens import find_platens
+from addvc.images.platens import moved_faces
 from addvc.images.spline import DEGREE, gaussian_blur
 
 log = logging.getLogger(__name__)
@@ -39,6 +39,14 @@ log = logging.getLogger(__name__)
 MOST = 3e7
 """Voxels of an image of which each may take part on the last level; of more, one in eight or fewer. At
 504 x 551 x 507 voxels 2.2 million clear ones are left of 29; it takes 7.7 GB and 157 CPU-s."""
+
+ROOM = 150
+"""Voxels of the image for a control point, at least: one takes 12 kB, the images 8 bytes a voxel, and
+the workflow declares ten times as much as these. A spacing that asks for more points stays twice as
+large."""
+
+ALWAYS = 100_000
+"""Control points that there is room for in any image."""
 
 NOMINAL_CELL = 28.0  # voxels: the cell size that LEVELS is written for
 
@@ -117,13 +125,14 @@ def affine_start(
     grid: SplineGrid, reference: np.ndarray, deformed: np.ndarray, axis: int
 ) -> np.ndarray:
     """Coefficients (nx, ny, nz, 3) of the compression between the platens seen in both images, rigid
-    beyond their faces; zero where the platens cannot be told."""
+    beyond their faces; zero where these do not show the same platens."""
     points = grid.control_points()
     u = np.zeros_like(points)
-    before, after = find_platens(reference, axis), find_platens(deformed, axis)
-    if before is None or after is None:
-        log.info("free-form: no platens seen in both images, from rest")
+    faces = moved_faces(reference, deformed, axis)
+    if faces is None:
+        log.info("free-form: the images do not show the same platens, from rest")
         return u
+    before, after = faces
     log.info("free-form: platens from %s to %s voxels", np.round(before, 2), np.round(after, 2))
     between = np.clip(points[..., axis], *before)
     u[..., axis] = np.interp(between, before, np.subtract(after, before))
@@ -165,7 +174,7 @@ def freeform(
     grid = grid_over(reference.shape, options.levels[0].spacing)
     u, table, history, seconds = affine_start(grid, reference, deformed, options.axis), [], [], 0.0
     for level in options.levels:
-        while grid.spacing > 1.01 * level.spacing:
+        while grid.spacing > 1.01 * level.spacing and has_room(grid.finer(), reference.size):
             grid, u = grid.finer(), refine(u)
         blurred = gaussian_blur(reference, level.blur)
         stride = max(level.stride, thinning(reference.size, MOST))
@@ -179,10 +188,22 @@ def freeform(
     return grid, replace(solution, history=history, seconds=seconds), table
 
 
+def has_room(grid: SplineGrid, voxels: int) -> bool:
+    """Whether the matrices of a grid fit in what an image of so many voxels asks for anyway."""
+    found = np.prod(grid.shape) <= max(ALWAYS, voxels / ROOM)
+    if not found:
+        log.warning(
+            "free-form: a spacing of %.3g voxels would take %d control points (at most %d here): it "
+            "stays %.3g; scans.bin and freeform.spacing are small for this image",
+            grid.spacing, np.prod(grid.shape), max(ALWAYS, voxels / ROOM), 2 * grid.spacing,
+        )  # fmt: skip
+    return bool(found)
+
+
 def level_row(level: Level, sampling: Sampling, solution: Solution) -> dict:
     """What a level did, for logs and tables."""
     return {
-        "spacing": level.spacing,
+        "spacing": sampling.grid.spacing,
         "blur": level.blur,
         "points": len(sampling.grey),
         "iterations": solution.iterations,

@@ -149,7 +149,7 @@ def turns(section: dict, method: str) -> bool:
 
 def stages(section: dict, levels: dict, method: str = "corotational") -> list[Stage]:
     """Stages of micro DVC from the `micro` section of a configuration and the grey `levels` of the
-    threshold (void, solid, noise); all but the last end early (`correlation.corotational.early`)."""
+    threshold (void, solid, noise); all but the last end early (`correlation.stages.early`)."""
     rotated = turns(section, method)
     scale = None if method == "without_robust" else robust_scale(section["robust"], levels)
     last = Stop(section["tolerance"], section["max_iterations"])

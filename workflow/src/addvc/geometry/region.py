@@ -24,9 +24,12 @@ class Region:
     cut_sides: bool = False
 
 
-def micro_region(specimen: Specimen, setting, margin: float = 3.0) -> Region:
+def micro_region(specimen: Specimen, setting, margin: float = 3.0, sides: str = "auto") -> Region:
     """Region of `micro.region`: "all" (up to `margin` voxels from platens or image ends), or a dict
     {low, high, radius}, any of them left out for the whole.
+
+    `sides` of the specimen: "free", with `margin` voxels of air, or "cut" through material, kept clear
+    of by as much; "auto": free of a cylinder, cut of a box.
 
     Raises GeometryError when it is empty."""
     wanted = {} if setting == "all" else dict(setting)
@@ -39,17 +42,19 @@ def micro_region(specimen: Specimen, setting, margin: float = 3.0) -> Region:
             f"axis (at least 4) of {specimen.low + margin:.1f} to {specimen.high - margin:.1f}, where "
             "the specimen is (voxels of the binned image); give a slab within that"
         )
+    cut = specimen.kind == "box" if sides == "auto" else sides == "cut"
+    beyond = -margin if cut else margin
     if specimen.kind == "box":
         width = wanted.get("radius", np.inf)
         bounds = []
         for a, b in specimen.bounds:
-            half = min((b - a) / 2 - margin, width)
+            half = min((b - a) / 2 + beyond, width)
             bounds.append(((a + b) / 2 - half, (a + b) / 2 + half))
-        return Region(specimen.axis, low, high, bounds=tuple(bounds), cut_sides=True)
-    radius = min(wanted.get("radius", np.inf), specimen.radius + margin)
-    return Region(
-        specimen.axis, low, high, tuple(specimen.centre), radius, cut_sides=radius < specimen.radius
-    )
+            cut |= half < (b - a) / 2
+        return Region(specimen.axis, low, high, bounds=tuple(bounds), cut_sides=cut)
+    radius = min(wanted.get("radius", np.inf), specimen.radius + beyond)
+    cut |= radius < specimen.radius
+    return Region(specimen.axis, low, high, tuple(specimen.centre), radius, cut_sides=cut)
 
 
 def caps_depth(region: Region, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ same mesh, and the dihedral angles are bounded from below by construction.
 
 Why not pytetwild here: at 76,000 surface triangles (default twin) one pass of its optimiser took
 433 s and left angles of 1.5 degrees; without optimisation 33 s, angles of 0 degrees. The lattice
-takes seconds. pytetwild stays available (`mesh.backend`), and makes the meso meshes.
+takes seconds. pytetwild stays available (`mesh.backend`).
 
 Lattice: corners of cubes of side a, and their centres. Each face of a cube, between two centres,
 gives four tetrahedra (both centres and one edge of the face).

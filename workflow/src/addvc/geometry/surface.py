@@ -55,7 +55,8 @@ def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]
         )
     size = np.bincount(label.ravel())[1:]
     largest = int(np.argmax(size)) + 1
-    kept = np.where((label == 0) | (label == largest), grey, np.float32(gamma - 1e-3))
+    below = min(np.float32(gamma - 1e-3), np.nextafter(np.float32(gamma), np.float32(-np.inf)))
+    kept = np.where((label == 0) | (label == largest), grey, below)
     return kept, {
         "components": int(count),
         "kept_fraction": float(size.max() / size.sum()),

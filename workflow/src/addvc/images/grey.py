@@ -2,13 +2,15 @@
 
 Two levels are compared, those of void and of solid: the medians of the two classes that the intermeans
 threshold (Ridler & Calvard 1978) makes of the voxels between the platens. They do not depend on how
-many voxels are solid, which compression changes.
+many voxels are solid, which compression changes. Where little is solid there are several such
+thresholds, the lower ones within the noise of the void: the highest counts.
 """
 
 import logging
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import median_abs_deviation
 from skimage.filters import threshold_isodata
 
 from addvc.errors import ScanError
@@ -19,6 +21,7 @@ log = logging.getLogger(__name__)
 MARGIN = 3  # voxels off the platens, whose faces are blurred
 LEAST = 0.2  # of the reference's contrast: less is no scan of the same foam
 SAMPLES = 2_000_000  # voxels that are enough for two medians
+CLEAR = 2.0  # deviations of the void that the threshold is above it, at least
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class Levels:
 def grey_levels(volume: np.ndarray, axis: int) -> Levels:
     """Void and solid of a volume (nx, ny, nz), between its platens along `axis` where it shows any.
 
-    Raises ScanError when all grey levels are the same."""
+    Raises ScanError when all grey levels are the same, or noise hides the solid."""
     faces = find_platens(volume, axis)
     rows = np.moveaxis(volume, axis, 0)
     if faces is not None:
@@ -47,8 +50,16 @@ def grey_levels(volume: np.ndarray, axis: int) -> Levels:
             "the grey levels of a scan are all the same between its platens: images.grey cannot match "
             "them; check the scan, or use images.grey: none"
         )
-    middle = threshold_isodata(grey)
-    return Levels(float(np.median(grey[grey <= middle])), float(np.median(grey[grey > middle])))
+    middle = np.max(threshold_isodata(grey, return_all=True))
+    below = grey[grey <= middle]
+    void, noise = np.median(below), median_abs_deviation(below, scale="normal")
+    if middle < void + CLEAR * noise:
+        raise ScanError(
+            f"void and solid of a scan cannot be told apart: the threshold between them, {middle:.1f}, "
+            f"is within {CLEAR:g} deviations of the void ({void:.1f}, noise {noise:.1f}); raise "
+            "scans.bin, or use images.grey: none"
+        )
+    return Levels(float(void), float(np.median(grey[grey > middle])))
 
 
 def matched(volume: np.ndarray, levels: Levels, wanted: Levels) -> np.ndarray:

@@ -33,6 +33,19 @@ def find_platens(volume: NDArray, axis: int) -> tuple[float, float] | None:
     return (-0.5 if low is None else low), (n - 0.5 if high is None else n - 1 - high)
 
 
+def moved_faces(
+    reference: NDArray, deformed: NDArray, axis: int
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """The faces of `find_platens` in two images of one size, None where either does not show the same
+    platens: the end of an image is no place that a platen has moved from or to."""
+    before, after = find_platens(reference, axis), find_platens(deformed, axis)
+    if before is None or after is None:
+        return None
+    ends = -0.5, reference.shape[axis] - 0.5
+    seen = [tuple(face != end for face, end in zip(p, ends, strict=True)) for p in (before, after)]
+    return (before, after) if seen[0] == seen[1] else None
+
+
 def _row_profiles(volume: NDArray, axis: int) -> tuple[NDArray, NDArray, float]:
     """Mean and lower quartile (n,) of each row in the disc, and the grey contrast of the disc."""
     rows = np.moveaxis(volume, axis, 0)

@@ -29,7 +29,7 @@ PALE_BLUE = "#9dbfe0"
 
 def states(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 3: the segmented foam in the reference and in each state, at one scale."""
-    numbers = [0, *case.states]
+    numbers = [0, *case.pictured]
     foams = [_foam(case, n) for n in numbers]
     view = oblique(case.specimen.axis)
     fit = np.vstack([points for points, _ in foams])

@@ -15,6 +15,10 @@ from addvc.fem.mesh import Mesh
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_volume
 from addvc.images.specimen import Specimen
+from addvc.report.style import Colour, series
+
+PICTURED = 6
+"""States in a row of pictures, at most."""
 
 FOLDED = 0.01
 """Share of elements turned inside out over which it is told."""
@@ -54,6 +58,18 @@ class Case:
     @property
     def states(self) -> list[int]:
         return sorted(self.labels)
+
+    @property
+    def pictured(self) -> list[int]:
+        """The states that rows of pictures have room for: of many, PICTURED from first to last."""
+        if len(self.states) <= PICTURED:
+            return self.states
+        places = np.linspace(0, len(self.states) - 1, PICTURED)
+        return [self.states[place] for place in places.round().astype(int)]
+
+    def colour(self, state: int) -> Colour:
+        """Of the curves of a state, the same in all figures."""
+        return series(len(self.states))[self.states.index(state)]
 
     @property
     def finest(self) -> str:

@@ -121,8 +121,8 @@ def band_words(band: dict) -> str:
 def profiles(ax: Axes, case: Case, grids: dict, truth: bool) -> None:
     """Mean axial strain (percent) of each plane of the grid across the loading axis."""
     axis = case.specimen.axis
-    for number, (state, grid) in enumerate(grids.items()):
-        colour = style.SERIES[number % len(style.SERIES)]
+    for state, grid in grids.items():
+        colour = case.colour(state)
         ax.plot(*profile(*grid, axis), color=colour, label=case.labels[state])
         if truth:
             true = grid_of(read_columns(case.path(f"analysis/cells_truth_state{state}.csv")))

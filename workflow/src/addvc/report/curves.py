@@ -79,7 +79,7 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
 
 def _density_handles(case: Case) -> list:
     """A line a state, that of a result that is not right, that of noise alone."""
-    lines = [style.line(style.SERIES[(n - 1) % 6], case.labels[n]) for n in case.states]
+    lines = [style.line(case.colour(n), case.labels[n]) for n in case.states]
     if any(case.status(name, n) for name in (case.finest, *case.micro) for n in case.states):
         lines.append(style.line("k", "failed or not converged", "--"))
     if known := _noise_stds(case):
@@ -96,7 +96,7 @@ def _state_handles(case: Case) -> list:
     """A line a state, with what became of it by the default micro method."""
     name = case.micro[0]
     titles = {n: f"{case.labels[n]}: {name} {case.verdict(name, n)}" for n in case.states}
-    return [style.line(style.SERIES[(n - 1) % 6], text) for n, text in titles.items()]
+    return [style.line(case.colour(n), text) for n, text in titles.items()]
 
 
 def _noise_alone(ax: Axes, case: Case, reach: float) -> None:
@@ -128,7 +128,7 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
     ax.plot(
         (edges[1:] + edges[:-1]) / 2,
         density,
-        color=style.SERIES[(state - 1) % 6],
+        color=case.colour(state),
         ls="--" if wrong else "-",
         lw=1.3,
         label=f"σ = {stats['std']:.2f}",
@@ -164,7 +164,7 @@ def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
     """History of one result, with a cross at its end when it failed."""
     solution = case.solution(name, state)
     steps = np.arange(1, solution.iterations + 1)
-    colour = style.SERIES[(state - 1) % 6]
+    colour = case.colour(state)
     ax.plot(steps, solution.history, "o-", color=colour, ms=2.5, lw=1.1)
     if not solution.converged:
         ax.plot(steps[-1:], solution.history[-1:], "x", color=style.RED, ms=7, mew=2, zorder=4)
@@ -175,7 +175,7 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
     fig = style.figure(75, 110)
     ax = fig.subplots()
     for state in case.states:
-        colour = style.SERIES[(state - 1) % 6]
+        colour = case.colour(state)
         trials = case.notes(case.micro[0], state)["risk"]
         if not trials:
             continue

@@ -21,9 +21,9 @@ def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     values = {
         (name, n): _cell_residual(case, name, n, len(mesh.cells))[owner]
         for name in names
-        for n in case.states
+        for n in case.pictured
     }
-    norm, columns = _residual_range(case, values), len(case.states)
+    norm, columns = _residual_range(case, values), len(case.pictured)
     fig, axes = style.panels(len(names), columns, aspect(view, mesh.points), 15, 18, below=6)
     for panel, ((name, state), r) in enumerate(values.items()):
         layer = Layer(mesh.points, faces, values=r, norm=norm, cmap=style.SIGNED)

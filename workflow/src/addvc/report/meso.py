@@ -15,13 +15,13 @@ GOOD, BAD = "#a9c8e6", "#eab0a4"
 
 def deformed(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 10: each meso mesh deformed by its displacement, a row a mesh, with sigma(r)."""
-    columns, rows = len(case.states), len(case.meso)
+    columns, rows = len(case.pictured), len(case.meso)
     meshes = [case.mesh(name) for name in case.meso]
     fit, view = _reach(meshes[-1]), oblique(case.specimen.axis)
     fig, axes = style.panels(rows, columns, aspect(view, fit), spare=15, below=9)
     for row, (name, mesh) in enumerate(zip(case.meso, meshes, strict=True)):
         faces, _ = boundary(mesh)
-        for column, state in enumerate(case.states):
+        for column, state in enumerate(case.pictured):
             solution, ax = case.solution(name, state), axes[row, column]
             colour = BAD if case.status(name, state) else GOOD
             layer = Layer(mesh.points + solution.u, faces, colour, edges=True, line_width=1.5)
@@ -46,14 +46,14 @@ def displacement(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 11: u_x, u_y, u_z of the finest meso mesh, cut in half, a column a state."""
     mesh, axis, name = case.mesh(case.finest), case.specimen.axis, case.finest
     view, fit = oblique(axis, azimuth=20, elevation=18), _reach(mesh)
-    u = {n: case.solution(name, n).u for n in case.states}
-    halves = {n: _half(mesh, u[n], axis) for n in case.states}
-    usable = [n for n in case.states if not case.status(name, n)] or case.states
+    u = {n: case.solution(name, n).u for n in case.pictured}
+    halves = {n: _half(mesh, u[n], axis) for n in u}
+    usable = [n for n in u if not case.status(name, n)] or list(u)
     columns = len(u)
     fig, axes = style.panels(3, columns, aspect(view, fit), bar=16, below=8)
     for d in range(3):
         norm, cmap = style.component_range([u[n][:, d] for n in usable], root=True)
-        for column, state in enumerate(case.states):
+        for column, state in enumerate(u):
             points, faces, motion = halves[state]
             layer = Layer(points + motion, faces, values=motion[:, d], norm=norm, cmap=cmap)
             ax, values = axes[d, column], u[state][:, d]

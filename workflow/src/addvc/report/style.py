@@ -36,6 +36,7 @@ OTHERS = (
     "#7f7f7f",
 )  # results but finest meso and micro
 AXES = "xyz"
+Colour = str | tuple[float, float, float, float]
 
 ARROW = 14.0  # length of the arrows along the axes, points
 ARROWHEAD = {"arrowstyle": "<|-", "lw": 1, "color": "k", "shrinkA": 0, "shrinkB": 0}
@@ -89,14 +90,22 @@ def rows_of_pictures(
     return fig, fig.subplots(len(aspects), columns, squeeze=False, height_ratios=heights)
 
 
+def series(count: int) -> list[Colour]:
+    """Colours of curves in an order, `count` of them."""
+    if count <= len(SERIES):
+        return list(SERIES[:count])
+    return [plt.get_cmap(MAGNITUDE)(share) for share in np.linspace(0, 0.95, count)]
+
+
 def signed(value: float, digits: int = 2) -> str:
     """A number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def letter(number: int) -> str:
-    """(a), (b), ... for 0, 1, ..."""
-    return f"({chr(ord('a') + number)})"
+    """(a), (b), ... (z), (aa), ... for 0, 1, ..."""
+    more, last = divmod(number, 26)
+    return f"({chr(ord('a') + more - 1) if more else ''}{chr(ord('a') + last)})"
 
 
 def headline(ax: Axes, text: str, number: int | None = None) -> None:

@@ -20,7 +20,7 @@ SPAN = 30.0  # energies are shown from their mean over this to their mean times 
 
 def scans(case: Case, outputs: Iterable[str]) -> None:
     """Each scan as it is: (top) a slice along the loading axis, (bottom) its maximum projection."""
-    numbers, specimen = [0, *case.states], case.specimen
+    numbers, specimen = [0, *case.pictured], case.specimen
     normal = specimen.across[1]
     images = [case.image(n, smooth=False) for n in numbers]
     pictures = [_upright(v, specimen.axis, normal) for v in images]

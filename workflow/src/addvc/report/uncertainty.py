@@ -72,10 +72,10 @@ def _by_radius(ax: Axes, struts: list, found: np.ndarray) -> None:
 def _calibration(ax: Axes, case: Case) -> None:
     """rms error of valid nodes of like uncertainty, a line a state; on the diagonal noise is all."""
     most = 0.0
-    for number, state in enumerate(case.states):
+    for state in case.states:
         found = case.json(f"analysis/uncertainty_truth_state{state}.json")
         bins = np.array(found["bins"], dtype=float).reshape(-1, 2)
-        colour = style.SERIES[number % len(style.SERIES)]
+        colour = case.colour(state)
         ax.plot(*bins.T, "o-", ms=3, lw=1, color=colour, label=case.title(state, case.micro[0]))
         most = max(most, bins[:, 0].max(initial=0))
     ax.axline((0, 0), slope=1, color="#777777", lw=0.8, ls=":", label="noise alone")

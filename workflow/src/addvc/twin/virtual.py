@@ -1,7 +1,8 @@
 """Virtual states of a real scan: its image warped by a known smooth field, with fresh noise.
 
 The field is given where it is easy to warp with, in the deformed image: I_d(y) = I_r(y - v(y)),
-v(y) = -strain (y - low) along the loading axis plus waves. The displacement to be found, u(x) with
+v(y) = -strain / (1 - strain) (y - low) along the loading axis, which shortens the reference by
+`strain`, plus waves. The displacement to be found, u(x) with
 I_r(x) = I_d(x + u(x)), then solves u = v(x + u), to round-off, by fixed-point iterations.
 Lengths in voxels of the binned image.
 """
@@ -46,7 +47,7 @@ class VirtualField:
             ],
             1,
         )
-        v[:, self.axis] -= strain * (y[:, self.axis] - self.low)
+        v[:, self.axis] -= strain / (1 - strain) * (y[:, self.axis] - self.low)
         return v
 
     def displacement(self, points: np.ndarray, state: int) -> np.ndarray:
