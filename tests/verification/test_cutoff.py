@@ -130,14 +130,18 @@ def test_far_from_where_it_was_a_stage_is_run_and_the_choice_made_again(problem,
     choice, lengths = chosen([-4, -3])
     assert lengths == [pytest.approx(RATIO**-4)] and len(choice.steps) == 1
     assert choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO**-3)
-    choice, lengths = chosen([1])
-    assert lengths == [] and choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO)
 
 
-def test_back_on_the_first_rung_the_images_are_looked_at_again(problem, chosen):
-    choice, lengths = chosen([-4, 0, 1])
-    assert lengths == [pytest.approx(RATIO**-4), pytest.approx(1)]
-    assert choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO)
+@pytest.mark.parametrize("rung", [1, 5])
+def test_a_longer_one_is_trusted_at_once(problem, chosen, rung):
+    choice, lengths = chosen([rung])
+    assert lengths == [] and choice.problem.cutoff == pytest.approx(problem.cutoff * RATIO**rung)
+
+
+def test_from_a_shorter_one_the_way_back_is_open(problem, chosen):
+    choice, lengths = chosen([-4, 0])
+    assert lengths == [pytest.approx(RATIO**-4)]
+    assert choice.problem.cutoff == pytest.approx(problem.cutoff)
 
 
 def test_a_stage_that_is_not_finite_leaves_the_length_as_it_was(problem, chosen):

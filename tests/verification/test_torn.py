@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from addvc.correlation.corotational import corotational
 from addvc.correlation.mending import Mending
 from addvc.correlation.micro import elastic, micro_options, micro_reference
 from addvc.correlation.register import Stop
-from addvc.correlation.stages import Problem, Stage
-from addvc.correlation.torn import apart, joints_of, torn_joints
+from addvc.correlation.stages import Problem, Stage, stage_system
+from addvc.correlation.torn import SOFT, apart, joints_of, torn_joints
+from addvc.fem.mesh import cell_volumes
 from addvc.fem.operators import corotational_load, stiffness
 from addvc.fem.shell import shell_points
 from addvc.geometry.stuffing import stuff
@@ -78,6 +80,21 @@ def test_a_strut_that_went_astray_is_not_cut(problem, bridged):
     assert "carried" in [row["stage"] for row in notes["stages"]]
     assert notes["torn"] == notes["torn_cells"] == []
     assert rms_error(found.u, 0 * points) < 0.06
+
+
+def test_a_bridge_is_softer_than_the_other_struts_and_a_cut_softer_still(bridged):
+    """Stretched along itself, each cell stores energy by its modulus."""
+    mesh, (joint,) = bridged.reference.mesh, bridged.joints
+    soft = replace(bridged, bridge=0.5)
+    assert_array_equal(soft.modulus, np.where(joint.around, 0.5, 1.0))
+    assert_array_equal(soft.tear([joint]).modulus[joint.layer], SOFT)
+    u = mesh.points * [0.01, 0, 0]
+    energy = [
+        u.ravel() @ (stage_system(one, PLAN[0], 0 * u).regularisation @ u.ravel())
+        for one in (bridged, soft)
+    ]
+    share = cell_volumes(mesh)[joint.around].sum() / cell_volumes(mesh).sum()
+    assert energy[1] / energy[0] == pytest.approx(1 - share / 2)
 
 
 def test_a_cut_goes_across_one_strut_and_nothing_else(bridged):

@@ -51,7 +51,7 @@ class Ladder:
 
     noise: Noise
     shortest: int = -5
-    longest: int = 2
+    longest: int = 6
     draws: int = 1
 
 

@@ -42,7 +42,8 @@ def early(last: Stop) -> Stop:
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What all states share: I_r on struts and shell, c of the energy and the l_E (voxels) that it
-    stands for, nu, order of elimination, bridges; and those of these that a state tears."""
+    stands for, nu, order of elimination, bridges; those of these that a state tears; the stiffness of
+    the others over that of other struts."""
 
     reference: Reference
     weight: float
@@ -52,6 +53,15 @@ class Problem:
     smoothing: int = 4
     joints: Sequence[Joint] = ()
     cuts: Sequence[Joint] = ()
+    bridge: float = 1.0
+
+    @property
+    def modulus(self) -> np.ndarray | float:
+        """Young's modulus of each cell (m,), or of all, over that of the solid."""
+        if not self.joints:
+            return 1.0
+        found = np.where(np.any([joint.around for joint in self.joints], axis=0), self.bridge, 1.0)
+        return np.where(layers(self.cuts), SOFT, found) if self.cuts else found
 
     def tear(self, cuts: Sequence[Joint]) -> "Problem":
         """With these bridges cut: the points of their layers do not count, and these are SOFT."""
@@ -75,11 +85,10 @@ def stage_system(problem: Problem, stage: Stage, u: np.ndarray | None) -> System
     mesh, pattern = problem.reference.mesh, node_pattern(problem.reference.mesh)
     rotation = smooth_rotations(mesh, u, problem.smoothing) if stage.rotated else None
     reference, load = problem.reference, None
-    modulus = np.where(layers(problem.cuts), SOFT, 1.0) if problem.cuts else 1.0
     if rotation is not None:
         reference = turned(reference, rotation)
-        load = problem.weight * corotational_load(mesh, problem.nu, rotation, modulus)
-    energy = problem.weight * stiffness(mesh, problem.nu, pattern, rotation, modulus)
+        load = problem.weight * corotational_load(mesh, problem.nu, rotation, problem.modulus)
+    energy = problem.weight * stiffness(mesh, problem.nu, pattern, rotation, problem.modulus)
     factor = factorise(hessian(reference, pattern) + energy, problem.order)
     return System(reference, energy, factor, load, stage.scale)
 
