@@ -3,6 +3,7 @@
 import csv
 import html
 import re
+from dataclasses import replace
 
 import h5py
 import matplotlib.pyplot as plt
@@ -102,6 +103,17 @@ def test_a_result_looks_alike_in_all_figures():
     many = style.looks(("meso33", "meso12"), ("micro", "micro-eq10"), ["freeform"])
     assert all(few[name]["color"] == many[name]["color"] for name in few)
     assert len({look["color"] for look in many.values()}) == len(many) == 5
+
+
+@pytest.mark.parametrize(("count", "shown"), [(3, [1, 2, 3]), (11, [1, 3, 5, 7, 9, 11])])
+def test_many_states_are_told_apart_and_pictured_from_first_to_last(case, count, shown):
+    many = replace(case, labels={n: f"state {n}" for n in range(1, count + 1)})
+    assert many.pictured == shown
+    assert len({many.colour(n) for n in many.states}) == count
+
+
+def test_panels_beyond_the_alphabet_have_two_letters():
+    assert [style.letter(n) for n in (0, 25, 26, 52)] == ["(a)", "(z)", "(aa)", "(ba)"]
 
 
 def test_labels_survive_keys_that_are_words(folder):

@@ -99,6 +99,13 @@ def test_an_import_only_goes_to_the_left():
     assert wrong == []
 
 
+def test_each_folder_says_what_it_may_import():
+    for folder, allowed in MAY_IMPORT.items():
+        words = ast.get_docstring(ast.parse((PACKAGE / folder / "__init__.py").read_text()))
+        sentence = re.search(r"May import ([^.]*) only\b", words)[1]
+        assert set(re.findall(r"`(\w+)`", sentence)) == allowed - {folder}, folder
+
+
 def test_the_modules_that_rules_load_need_no_numerics():
     """They are loaded anew for each job; readme.py alone is for us."""
     for path in sorted(PACKAGE.glob("*.py")):

@@ -1,6 +1,6 @@
 """The measurement: grey-level functional, regularisation, Gauss-Newton, initialisation, transfer.
 
-May import `images`, `fem`, `geometry` and `errors`. No step reads a truth.
+May import `images`, `fem`, `geometry`, `config` and `errors` only. No step reads a truth.
 Eq. 2, 3, 5: metric, gauss_newton. Eq. 6, 7: reduced_basis, meso_start. Eq. 9 to 11: regularisation.
 Section 3.2: meso (on clear voxels). Eq. 10 and the default method: micro, corotational (with doubt),
 on register. Cut-off lengths from the images: cutoff. Table 2: ultimate, uncertainty. Appendix A:

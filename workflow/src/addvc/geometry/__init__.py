@@ -1,4 +1,4 @@
 """From the image to meshes: cell size, threshold, surface, tetrahedra, meso meshes, grid, skeleton.
 
-May import `images`, `fem` and `errors`. Fig. 4 to 9 of the paper.
+May import `images`, `fem`, `config` and `errors` only. Fig. 4 to 9 of the paper.
 """

@@ -1,5 +1,5 @@
 """Volumes: reading scans, levels (bin, crop, pyramid), the specimen in its image, B-splines.
 
-May import nothing of addvc but `errors`. A volume is I[i, j, k] with x = i, y = j, z = k at
+May import `config` and `errors` only. A volume is I[i, j, k] with x = i, y = j, z = k at
 voxel centres, float32.
 """

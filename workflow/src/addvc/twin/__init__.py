@@ -1,6 +1,6 @@
 """A synthetic in-situ compression test of an open-cell foam between two platens.
 
-May import `addvc.images` and `addvc.fem` only. Lengths are voxels of the binned
+May import `images`, `fem`, `config` and `errors` only. Lengths are voxels of the binned
 image, axes x, y, z; compression is along y; I_reference(x) = I_state(x + u(x)).
 
 - `TwinOptions.from_config(dict)`; `SIZES`: shape of the binned image of each size.
