@@ -12,12 +12,10 @@ from addvc.analysis.truth import Judge, load_truth
 from addvc.correlation.corotational import corotational
 from addvc.correlation.micro import (
     elastic,
-    ladder,
-    mending,
     micro_options,
     micro_reference,
+    plan,
     problem_of,
-    stages,
 )
 from addvc.correlation.store import load_field, load_order
 from addvc.errors import AddvcError
@@ -109,9 +107,9 @@ def micro_with(folder: Path, config: dict, state: int, changes: dict) -> tuple[n
     bridges = read_json(folder / "geometry/bridges.json")
     problem = problem_of(reference, weights, micro["nu"], order, bridges)
     u = load_field(folder / f"dvc/micro_start_state{state}.h5")
-    plan = stages(micro, levels), mending(micro, levels)
-    cutoffs = ladder(micro, levels, config["images"]["blur"], "corotational")
-    solution, _ = corotational(problem, images[1], u, *plan, cutoffs)
+    solution, _ = corotational(
+        problem, images[1], u, *plan(micro, levels, config["images"]["blur"])
+    )
     return solution.u, time.process_time() - start
 
 

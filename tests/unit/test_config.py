@@ -117,6 +117,12 @@ def scans(tmp_path):
     return tmp_path
 
 
+def test_the_methods_of_micro_dvc_are_those_of_the_schema():
+    micro = SCHEMA["properties"]["micro"]["properties"]
+    assert set(micro["methods"]["items"]["enum"]) == set(settings.METHODS)
+    assert settings.METHODS["corotational"] == settings.Method()
+
+
 def test_a_scan_is_a_file_a_folder_or_a_pattern(scans):
     slices = [str(scans / "a/s09.tif"), str(scans / "a/s10.tif")]
     assert settings.scan_files(str(scans / "one.raw")) == [str(scans / "one.raw")]

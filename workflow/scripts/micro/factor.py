@@ -1,6 +1,7 @@
 """Eq. 10, or with an elastic energy: A = H + M of the micro mesh, factorised once for all states."""
 
 from addvc.runtime import job
+from addvc.config import METHODS
 from addvc.correlation.micro import elastic, eq10, micro_options, micro_reference, shell_of
 from addvc.correlation.store import save_factor
 from addvc.fem.io import read_vtu
@@ -18,7 +19,7 @@ with job(snakemake) as log:
     shell = shell_of(params.method, load_quadrature(source.shell))
     grey, degree = load_coefficients(source.reference)
     reference = micro_reference(Mesh(points, cells), grey, shell, degree)
-    if params.method == "eq10":
+    if METHODS[params.method].gap:
         matrix, extra, weights = eq10(reference, classes["penalised"] > 0, options)
     else:
         matrix, extra, weights = elastic(reference, options)

@@ -1,8 +1,9 @@
 """Micro DVC of one state by one method, from the best start on the micro mesh."""
 
 from addvc.runtime import job
+from addvc.config import METHODS
 from addvc.correlation.corotational import corotational
-from addvc.correlation.micro import ladder, mending, micro_reference, problem_of, shell_of, stages
+from addvc.correlation.micro import micro_reference, plan, problem_of, shell_of
 from addvc.correlation.register import Stop, System, register
 from addvc.correlation.store import load_factor, load_field, load_order, save_solution
 from addvc.fem.io import read_mesh
@@ -16,15 +17,13 @@ with job(snakemake):
     grey, degree = load_coefficients(source.reference)
     reference = micro_reference(read_mesh(source.mesh), grey, shell, degree)
     deformed, start = load_coefficients(source.deformed)[0], load_field(source.start)
-    if method == "eq10":
+    if METHODS[method].gap:
         factor, extra, notes = load_factor(source.factor)
         stop = Stop(micro["tolerance"], micro["max_iterations"])
         solution = register(System(reference, extra, factor), deformed, start, stop, "micro DVC")
     else:
         order, notes = load_order(source.factor)
         problem = problem_of(reference, notes, micro["nu"], order, read_json(source.bridges))
-        levels = read_json(source.threshold)
-        cutoffs = ladder(micro, levels, snakemake.params.blur, method)
-        plan = stages(micro, levels, method), mending(micro, levels), cutoffs
-        solution, notes = corotational(problem, deformed, start, *plan)
+        steps = plan(micro, read_json(source.threshold), snakemake.params.blur, method)
+        solution, notes = corotational(problem, deformed, start, *steps)
     save_solution(snakemake.output[0], solution, reference.mesh, **notes)

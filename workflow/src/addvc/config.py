@@ -8,6 +8,7 @@ import json
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from addvc.errors import ConfigError
@@ -168,10 +169,32 @@ def meso_size(config: dict, name: str, cell_size: float) -> float:
     return size if "sizes" in config["meso"] else size * cell_size / NOMINAL_CELL
 
 
+@dataclass(frozen=True)
+class Method:
+    """What a method of micro DVC has: the shell in its quadrature, a frame that turns, robust weights,
+    the choice of l_E; or, the paper's, the equilibrium gap of Eq. 10 in place of the elastic energy."""
+
+    shell: bool = True
+    rotation: bool = True
+    robust: bool = True
+    choice: bool = True
+    gap: bool = False
+
+
+METHODS = {
+    "corotational": Method(),
+    "without_shell": Method(shell=False),
+    "without_rotation": Method(rotation=False),
+    "without_robust": Method(robust=False),
+    "without_choice": Method(choice=False),
+    "eq10": Method(shell=False, rotation=False, robust=False, choice=False, gap=True),
+}
+
+
 def chooses(section: dict, method: str) -> bool:
     """Whether the images choose l_E for a method; section: `micro`."""
     given = section["l_e"] != "auto" or "l_e" in section.get("times", {})
-    return not given and section["stages"] > 1 and method not in ("eq10", "without_choice")
+    return not given and section["stages"] > 1 and METHODS[method].choice
 
 
 def micro_names(config: dict) -> dict[str, str]:

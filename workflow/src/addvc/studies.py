@@ -6,17 +6,8 @@ before that it shares those of the case. No numerics, no imports of them."""
 
 from dataclasses import dataclass
 
-from addvc.config import micro_names
+from addvc.config import METHODS, micro_names
 from addvc.errors import ConfigError
-
-ABLATION = (
-    "corotational",
-    "without_shell",
-    "without_rotation",
-    "without_robust",
-    "without_choice",
-    "eq10",
-)
 
 EQ10 = ("l_k", "l_l")
 """Parameters of the paper's method."""
@@ -108,7 +99,7 @@ class Variant:
 
 def ablation() -> list[Variant]:
     """The default method, the same less each of its ingredients, and the paper's."""
-    return [Variant("method", 1, method) for method in ABLATION]
+    return [Variant("method", 1, method) for method in METHODS]
 
 
 def sensitivity(config: dict) -> list[Variant]:

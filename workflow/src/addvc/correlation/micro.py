@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from addvc.config import chooses
+from addvc.config import METHODS, chooses
 from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import residual_limit
 from addvc.correlation.mending import Mending
@@ -115,7 +115,7 @@ def system_at_rest(
 ) -> System:
     """The system of a method before any turning, from what `factor` holds; with the weight of the
     elastic energy that `solution` was found with, where there is one."""
-    if method == "eq10":
+    if METHODS[method].gap:
         known, extra, _ = load_factor(factor)
         return System(reference, extra, known)
     order, weights = load_order(factor)
@@ -125,8 +125,8 @@ def system_at_rest(
 
 
 def shell_of(method: str, shell: Quadrature) -> Quadrature | None:
-    """The shell where a method has one: not the paper's, whose points are inside the struts."""
-    return None if method in ("eq10", "without_shell") else shell
+    """The shell where a method has one."""
+    return shell if METHODS[method].shell else None
 
 
 def robust_scale(setting: str | float, levels: dict) -> float | None:
@@ -144,14 +144,14 @@ def robust_scale(setting: str | float, levels: dict) -> float | None:
 
 def turns(section: dict, method: str) -> bool:
     """Whether the frame of a method turns with the struts; `section`: `micro` of a configuration."""
-    return bool(section["rotated"]) and method not in ("eq10", "without_rotation")
+    return bool(section["rotated"]) and METHODS[method].rotation
 
 
 def stages(section: dict, levels: dict, method: str = "corotational") -> list[Stage]:
     """Stages of micro DVC from the `micro` section of a configuration and the grey `levels` of the
     threshold (void, solid, noise); all but the last end early (`correlation.stages.early`)."""
     rotated = turns(section, method)
-    scale = None if method == "without_robust" else robust_scale(section["robust"], levels)
+    scale = robust_scale(section["robust"], levels) if METHODS[method].robust else None
     last = Stop(section["tolerance"], section["max_iterations"])
     ends = [early(last)] * (section["stages"] - 1) + [last]
     return [Stage(rotated, scale, end) for end in ends]
@@ -169,3 +169,11 @@ def mending(section: dict, levels: dict) -> Mending | None:
     if section["mending"] == 0:
         return None
     return Mending(section["mending"], residual_limit(levels["noise_at_points"]))
+
+
+def plan(
+    section: dict, levels: dict, blur: float, method: str = "corotational"
+) -> tuple[list[Stage], Mending | None, Ladder | None]:
+    """What `corotational` does by a method: its stages, their mending, the choice of l_E."""
+    found = mending(section, levels), ladder(section, levels, blur, method)
+    return stages(section, levels, method), *found

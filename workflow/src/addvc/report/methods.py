@@ -1,7 +1,7 @@
 """Methods to paste into a paper, with references, from the configuration and the numbers."""
 
-from addvc.config import chooses, loading_axis, micro_names
-from addvc.correlation.micro import MicroOptions, micro_options
+from addvc.config import METHODS, chooses, loading_axis, micro_names
+from addvc.correlation.micro import MicroOptions, micro_options, turns
 from addvc.report import style
 from addvc.report.references import Citations
 
@@ -102,10 +102,10 @@ def micro(summary: dict, config: dict) -> str:
     wave = f"in weights set on a shear wave of period {options.period:g} voxels along {along}"
     for name, method in micro_names(config).items():
         lead = " The displacement of its nodes minimises" if name == "micro" else " For comparison:"
-        used = [state[name]["l_e"] for state in summary["states"] if method != "eq10"]
+        used = [state[name]["l_e"] for state in summary["states"] if not METHODS[method].gap]
         text += f"{lead} {functional(method, section, options, used)}, {wave} ({method})."
     first = section["methods"][0]
-    if section["mending"] and section["stages"] > 1 and first != "eq10":
+    if section["mending"] and section["stages"] > 1 and not METHODS[first].gap:
         text += (
             " Struts whose residual stayed too large were carried by their neighbours and registered "
             f"again, at most {section['mending']} times."
@@ -118,20 +118,20 @@ def micro(summary: dict, config: dict) -> str:
 
 def functional(method: str, section: dict, options: MicroOptions, cutoffs: list[float]) -> str:
     """What a method of micro DVC minimises; `cutoffs`: l_E of every state (voxels)."""
-    if method == "eq10":
+    parts = METHODS[method]
+    if parts.gap:
         return (
             "the squared residual in the struts, regularised by the equilibrium gap {gap} below "
             f"{options.l_k:.3g} voxels, and by a Laplacian below {options.l_l:.3g} voxels on penalised "
             f"faces (Poisson's ratio {options.nu:g})"
         )
-    shell = section["shell"] and method != "without_shell"
-    robust = section["robust"] != "none" and method != "without_robust"
-    turns = section["rotated"] and method != "without_rotation"
+    shell = section["shell"] and parts.shell
+    robust = section["robust"] != "none" and parts.robust
     return (
         f"the {'robust residual (Geman-McClure weights {robust})' if robust else 'squared residual'} "
         f"in the struts{f' and in the void within {shell:g} voxel of them' if shell else ''}, "
         f"regularised by an elastic energy (Poisson's ratio {options.nu:g})"
-        f"{' in a frame that turns with the struts' if turns else ''} below "
+        f"{' in a frame that turns with the struts' if turns(section, method) else ''} below "
         f"{span(cutoffs or [options.l_e], '.3g')} voxels{chosen_words(method, section)}"
     )
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from addvc.analysis.overlap import REST
+from addvc.config import METHODS
 from addvc.correlation.meso import meso_options
 from addvc.correlation.micro import micro_options
 from addvc.images.files import atomic_path
@@ -146,7 +147,7 @@ def _meso(case: Case, name: str, config: dict) -> dict[str, str]:
 def _micro(case: Case, config: dict, name: str, method: str) -> dict[str, str]:
     """Functional, lengths and start of a micro method."""
     options = micro_options(config["micro"], case.cell_size, case.specimen.axis)
-    if method == "eq10":
+    if METHODS[method].gap:
         functional, lengths = "Eq. 10", f"l_K = {options.l_k:.3g}, l_L = {options.l_l:.3g}"
     else:
         chosen = case.cutoffs(name) or [options.l_e]
