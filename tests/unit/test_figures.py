@@ -13,7 +13,7 @@ import pytest
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.store import save_field, save_solution
 from addvc.fem.io import write_vtu
-from addvc.fem.mesh import boundary_faces
+from addvc.fem.mesh import boundary_faces, outer_faces
 from addvc.images.files import write_json
 from addvc.images.scans_store import save_volume
 from addvc.report import (
@@ -141,13 +141,13 @@ def test_a_result_without_flags_is_converged_and_failures_are_red(case, folder):
 
 
 def test_boundary_agrees_with_the_mesh_module(cube):
-    faces, owner = surfaces.boundary(cube)
+    faces, owner = outer_faces(cube)
     assert {tuple(sorted(f)) for f in faces} == {tuple(sorted(f)) for f in boundary_faces(cube)}
     assert all(set(face) <= set(cube.cells[cell]) for face, cell in zip(faces, owner, strict=True))
 
 
 def test_boundary_of_a_part_is_closed(cube):
-    faces, _ = surfaces.boundary(cube, surfaces.centroids(cube)[:, 0] < 3)
+    faces, _ = outer_faces(cube, surfaces.centroids(cube)[:, 0] < 3)
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, count = np.unique(edges, axis=0, return_counts=True)
     assert (count % 2 == 0).all()

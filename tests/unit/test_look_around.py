@@ -17,11 +17,11 @@ from addvc.analysis.struts import Strut
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.store import save_solution
 from addvc.fem.io import write_series, write_vtu
+from addvc.fem.mesh import outer_faces
 from addvc.images.files import write_json
 from addvc.images.scans_store import save_volume
 from addvc.report import look_around
 from addvc.report.case import Case
-from addvc.report.surfaces import boundary
 
 TEMPLATE = Path(__file__).parents[2] / "workflow/report/scene.html"
 BROWSER = next(filter(shutil.which, ("chromium", "chromium-browser", "google-chrome")), None)
@@ -113,7 +113,7 @@ def test_the_page_holds_the_surface_its_motion_and_what_is_flagged(page, bar):
     data = payload(page)
     points = np.column_stack([unpacked(p) for p in data["points"]])
     faces = numbers(data["faces"], "<u4").reshape(-1, 3)
-    assert len(faces) == len(boundary(bar)[0]) and faces.max() == len(points) - 1
+    assert len(faces) == len(outer_faces(bar)[0]) and faces.max() == len(points) - 1
     for state, entry in enumerate(data["states"], start=1):
         u = np.column_stack([unpacked(p) for p in entry["u"]])
         assert np.allclose(u, state * SLOPE * points * [0, 1, 0], atol=1e-3)
@@ -129,7 +129,7 @@ def test_the_page_holds_the_surface_its_motion_and_what_is_flagged(page, bar):
 
 
 def test_of_a_large_mesh_a_slab_is_shown(bar):
-    faces = len(boundary(bar)[0])
+    faces = len(outer_faces(bar)[0])
     points, kept, used, words = look_around.shown_surface(bar, 1, faces // 2)
     assert 0 < len(kept) < faces and "slab" in words
     assert np.array_equal(points, bar.points[used])

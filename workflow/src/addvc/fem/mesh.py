@@ -82,12 +82,22 @@ def dihedral_range(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 def boundary_faces(mesh: Mesh) -> np.ndarray:
     """Faces that belong to one cell only, (f, 3) or (f, 4), wound outwards."""
+    return outer_faces(mesh)[0]
+
+
+def outer_faces(mesh: Mesh, keep: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The same, of the cells where `keep` (m,) is true, and the cell (f,) of each."""
+    chosen = np.arange(len(mesh.cells)) if keep is None else np.flatnonzero(keep)
     table = TET_FACES if mesh.is_tet else HEX_FACES
-    faces = mesh.cells[:, table].reshape(-1, table.shape[1])
+    faces = mesh.cells[chosen][:, table].reshape(-1, table.shape[1])
+    order = np.sort(faces, axis=1)[:, :3].astype(np.int64)  # three corners tell faces apart
+    n = len(mesh.points)
+    _, key = np.unique(order[:, 0] * n + order[:, 1], return_inverse=True)
     _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+        key.astype(np.int64) * n + order[:, 2], return_index=True, return_counts=True
     )
-    return faces[np.sort(first[count == 1])]
+    outer = np.sort(first[count == 1])
+    return faces[outer], np.repeat(chosen, len(table))[outer]
 
 
 def face_components(mesh: Mesh) -> np.ndarray:

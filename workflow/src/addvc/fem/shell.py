@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 from scipy.spatial import cKDTree
 
-from addvc.fem.mesh import TET_FACES, Mesh
+from addvc.fem.mesh import Mesh, outer_faces
 from addvc.fem.quadrature import Quadrature, barycentric, voxel_owner
 from addvc.images.files import atomic_path
 
@@ -27,7 +27,7 @@ def shell_points(mesh: Mesh, grey: np.ndarray, gamma: float, width: float = 1.0)
 
     `grey` (nx, ny, nz): a voxel at or above `gamma` is solid that the mesh leaves out (a platen, the
     other side of a cut), and is no point of the shell. May be empty."""
-    faces, owner = faces_and_owners(mesh)
+    faces, owner = outer_faces(mesh)
     points = void_near(mesh, grey, gamma, width)
     triangles = mesh.points[faces]
     centres = cKDTree(triangles.mean(axis=1))
@@ -50,22 +50,12 @@ def void_near(mesh: Mesh, grey: np.ndarray, gamma: float, width: float) -> np.nd
     high = np.ceil(mesh.points.max(axis=0) + width).astype(int) + 1
     box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
     points = np.argwhere(outside[box] & (grey[box] < gamma)) + low.astype(float)
-    faces, _ = faces_and_owners(mesh)
+    faces, _ = outer_faces(mesh)
     corner = mesh.points[faces]
     centre = corner.mean(axis=1)
     reach = width + np.linalg.norm(corner - centre[:, None], axis=2).max()
     away, _ = cKDTree(centre).query(points, distance_upper_bound=reach)
     return points[np.isfinite(away)]
-
-
-def faces_and_owners(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Boundary faces (f, 3) of a tetrahedral mesh, and the cell (f,) of each."""
-    faces = mesh.cells[:, TET_FACES].reshape(-1, 3)
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    first = np.sort(first[count == 1])
-    return faces[first], first // len(TET_FACES)
 
 
 @nb.njit(parallel=True, cache=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from addvc.fem.mesh import Mesh
+from addvc.fem.mesh import Mesh, outer_faces
 from addvc.geometry.region import Region, caps_depth
 from addvc.images.platens import find_platens
 from addvc.images.spline import gaussian_blur
@@ -12,7 +12,6 @@ from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, Picture, View, aspect, facing, oblique, render
 from addvc.report.surfaces import (
-    boundary,
     box_corners,
     centroids,
     clipped,
@@ -73,8 +72,8 @@ def _opened(mesh: Mesh, view: View, axis: int) -> Layer:
     """A mesh without the quarter of its cells at the right and in front, the inside in sand."""
     shift = centroids(mesh) - (mesh.points.min(axis=0) + mesh.points.max(axis=0)) / 2
     front = view.towards * (np.arange(3) != axis)
-    inner, _ = boundary(mesh, ~((shift @ view.right > 0) & (shift @ front > 0)))
-    skin = set(map(tuple, np.sort(boundary(mesh)[0], axis=1)))
+    inner, _ = outer_faces(mesh, ~((shift @ view.right > 0) & (shift @ front > 0)))
+    skin = set(map(tuple, np.sort(outer_faces(mesh)[0], axis=1)))
     outside = np.array([tuple(face) in skin for face in np.sort(inner, axis=1)])
     colour = np.where(outside[:, None], [157, 191, 224], [240, 200, 140]).astype(np.uint8)
     return Layer(mesh.points, inner, colour, edges=True, line_width=2)
@@ -117,7 +116,7 @@ def region(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 8: (a) the region in the whole foam, (b) its mesh close up."""
     mesh, facts = case.mesh("micro"), case.mesh_facts("micro")
     view = oblique(case.specimen.axis)
-    layers = [_outside(case), Layer(mesh.points, boundary(mesh)[0], style.BLUE)]
+    layers = [_outside(case), Layer(mesh.points, outer_faces(mesh)[0], style.BLUE)]
     pictures = {
         "region (blue) in the foam (grey)": render(layers, view, 80, shadows=True),
         "its mesh close up": _close_up(mesh, case, view),
@@ -159,7 +158,7 @@ def _close_up(mesh: Mesh, case: Case, view: View) -> Picture:
     tries = near[:: max(1, len(near) // 200)]
     counts = [in_box(near, x - half / 2, x + half / 2).sum() for x in tries]
     centre = tries[int(np.argmax(counts))]
-    faces, _ = boundary(mesh, in_box(where, centre - half, centre + half))
+    faces, _ = outer_faces(mesh, in_box(where, centre - half, centre + half))
     points, faces, _ = compact(mesh.points, faces)
     layer = Layer(points, faces, PALE_BLUE, edges=True, line_width=1.5)
     return render([layer], view, 80)
@@ -169,7 +168,7 @@ def penalised(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 9: nodes of the ends and of the sides, whose curvature is penalised (D_L)."""
     mesh, kind = case.mesh("micro"), case.penalised()
     colours = np.array([[191, 197, 204], [61, 134, 207], [224, 130, 20]], dtype=np.uint8)
-    faces, _ = boundary(mesh)
+    faces, _ = outer_faces(mesh)
     on_faces = colours[kind[faces].max(axis=1)]
     axis = case.specimen.axis
     views = {"from the side": oblique(axis), "from above": oblique(axis, 35, 75)}

@@ -16,12 +16,12 @@ from plotly.offline import get_plotlyjs
 
 from addvc.analysis.strut_store import load_partition, read_columns
 from addvc.fem.io import read_vtu
-from addvc.fem.mesh import Mesh, cell_volumes
+from addvc.fem.mesh import Mesh, cell_volumes, outer_faces
 from addvc.images.files import atomic_path
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import oblique
-from addvc.report.surfaces import boundary, centroids, compact
+from addvc.report.surfaces import centroids, compact
 
 MOST_BYTES = 14e6
 """Of the arrays before base64: with plotly.js the file then stays below 25 MB."""
@@ -106,13 +106,13 @@ def shown_surface(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
     """Points, triangles, the nodes that the points are, and words on what is shown: the boundary of
     the mesh, or, of a larger one, that of a slab along the loading axis with about `most` triangles."""
-    faces, _ = boundary(mesh)
+    faces, _ = outer_faces(mesh)
     words = ""
     if len(faces) > most:
         normal = 0 if axis != 0 else 1
         distance = np.abs(centroids(mesh)[:, normal] - np.median(mesh.points[:, normal]))
         half = np.quantile(distance, 0.9 * most / len(faces))
-        faces, _ = boundary(mesh, distance <= half)
+        faces, _ = outer_faces(mesh, distance <= half)
         words = (
             f"To keep the file small, only a slab {2 * half:.0f} voxels thick across "
             f"{style.AXES[normal]} is shown, from the middle of the specimen."

@@ -6,17 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.patches import Patch
 
+from addvc.fem.mesh import outer_faces
 from addvc.fem.operators import strain
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, facing, oblique, render
-from addvc.report.surfaces import boundary, clipped, slab, slab_box
+from addvc.report.surfaces import clipped, slab, slab_box
 
 
 def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 13: mean residual of each micro cell, a row a method, a column a state."""
     mesh, names = case.mesh("micro"), [case.finest, *case.micro]
-    faces, owner = boundary(mesh)
+    faces, owner = outer_faces(mesh)
     view = oblique(case.specimen.axis)
     values = {
         (name, n): _cell_residual(case, name, n, len(mesh.cells))[owner]

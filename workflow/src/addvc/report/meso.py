@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from addvc.fem.mesh import Mesh
+from addvc.fem.mesh import Mesh, outer_faces
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, oblique, render
-from addvc.report.surfaces import boundary, box_corners, clipped
+from addvc.report.surfaces import box_corners, clipped
 
 GOOD, BAD = "#a9c8e6", "#eab0a4"
 
@@ -20,7 +20,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
     fit, view = _reach(meshes[-1]), oblique(case.specimen.axis)
     fig, axes = style.panels(rows, columns, aspect(view, fit), spare=15, below=9)
     for row, (name, mesh) in enumerate(zip(case.meso, meshes, strict=True)):
-        faces, _ = boundary(mesh)
+        faces, _ = outer_faces(mesh)
         for column, state in enumerate(case.pictured):
             solution, ax = case.solution(name, state), axes[row, column]
             colour = BAD if case.status(name, state) else GOOD

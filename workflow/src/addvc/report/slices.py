@@ -5,11 +5,12 @@ from collections.abc import Iterable
 import numpy as np
 from matplotlib.axes import Axes
 
+from addvc.fem.mesh import outer_faces
 from addvc.images.specimen import Specimen
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, oblique, render
-from addvc.report.surfaces import boundary, whole_foam
+from addvc.report.surfaces import whole_foam
 
 
 def show_slice(ax: Axes, plane: np.ndarray, limits: tuple[float, float]) -> None:
@@ -40,7 +41,7 @@ def platen_grid(case: Case, outputs: Iterable[str]) -> None:
     volume = case.image(0)
     specimen, grid = case.specimen, case.mesh("grid")
     points, faces = whole_foam(volume, case.gamma, specimen, specimen.low, specimen.high)
-    edges = _edges(boundary(grid)[0])
+    edges = _edges(outer_faces(grid)[0])
     layers = [Layer(points, faces), Layer(grid.points, edges, style.BLUE, line_width=5)]
     picture = render(layers, oblique(specimen.axis), 80, shadows=True)
     slice_aspect = volume.shape[specimen.axis] / volume.shape[specimen.across[1]]

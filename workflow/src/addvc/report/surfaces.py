@@ -2,28 +2,12 @@
 
 import numpy as np
 
-from addvc.fem.mesh import HEX_FACES, TET_FACES, Mesh
+from addvc.fem.mesh import Mesh
 from addvc.geometry.surface import marching_cubes
 from addvc.images.levels import bin_mean, to_fine
 from addvc.images.specimen import Specimen
 
 MOST_VOXELS = 3e7  # of an image that is rendered as a whole; larger ones are binned
-
-
-def boundary(mesh: Mesh, keep: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Outer faces (f, 3 | 4) of the cells where `keep` (m,) is true, and the cell (f,) of each."""
-    chosen = np.arange(len(mesh.cells)) if keep is None else np.flatnonzero(keep)
-    table = TET_FACES if mesh.is_tet else HEX_FACES
-    faces = mesh.cells[chosen][:, table].reshape(-1, table.shape[1])
-    order = np.sort(faces, axis=1)[:, :3].astype(np.int64)  # three corners tell faces apart
-    n = len(mesh.points)
-    key = order[:, 0] * n + order[:, 1]
-    _, key = np.unique(key, return_inverse=True)
-    _, first, count = np.unique(
-        key.astype(np.int64) * n + order[:, 2], return_index=True, return_counts=True
-    )
-    outer = np.sort(first[count == 1])
-    return faces[outer], np.repeat(chosen, len(table))[outer]
 
 
 def compact(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,10 +4,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from addvc.fem.mesh import outer_faces
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, oblique, render
-from addvc.report.surfaces import boundary, compact
+from addvc.report.surfaces import compact
 
 KINDS = {
     "stubs": ("stubs", style.RED),
@@ -43,7 +44,7 @@ def places(found: dict) -> dict[str, np.ndarray]:
 def marked(case: Case, outputs: Iterable[str]) -> None:
     """The mesh in grey from two sides, a ball at each stub, neck, weld, contact and bridge."""
     mesh, where = case.mesh("micro"), places(case.json("geometry/topology.json"))
-    points, faces, _ = compact(mesh.points, boundary(mesh)[0])
+    points, faces, _ = compact(mesh.points, outer_faces(mesh)[0])
     foam = Layer(points, faces, colour="#d5dae0", opacity=0.35)
     balls = [ball(at, KINDS[kind][1]) for kind, at in where.items() if len(at)]
     views = [oblique(case.specimen.axis, azimuth) for azimuth in TURNS]

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 
 from addvc.analysis.noise import load_uncertainty
 from addvc.analysis.strut_store import load_partition
+from addvc.fem.mesh import outer_faces
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, oblique, render
-from addvc.report.surfaces import boundary
 
 NORMAL, ALONG = style.BLUE, style.ORANGE
 
@@ -44,7 +44,7 @@ def _map(fig, case: Case, nodes: np.ndarray, title: str) -> None:
     """The nodes on the surface of the micro mesh at rest."""
     mesh, view = case.mesh("micro"), oblique(case.specimen.axis)
     norm = style.robust_range([nodes])
-    layer = Layer(mesh.points, boundary(mesh)[0], values=nodes, norm=norm, cmap=style.MAGNITUDE)
+    layer = Layer(mesh.points, outer_faces(mesh)[0], values=nodes, norm=norm, cmap=style.MAGNITUDE)
     ax = fig.subplots()
     render([layer], view, 85).show(ax)
     style.headline(ax, f"uncertainty, {title}", 0)

@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
-from addvc.fem.mesh import Mesh
+from addvc.fem.mesh import Mesh, outer_faces
 from addvc.geometry.region import Region, caps_depth
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.scene import Layer, Picture, View, aspect, facing, render
-from addvc.report.surfaces import boundary, clipped, segmented, slab, slab_box
+from addvc.report.surfaces import clipped, segmented, slab, slab_box
 
 MESO, MICRO = "#e0903c", "#3d86cf"
 
@@ -140,7 +140,7 @@ def _zoom_title(case: Case, name: str, state: int) -> str:
 def _places(case: Case, mesh: Mesh, gap: np.ndarray, half: float, count: int = 2) -> list[int]:
     """Nodes where the gap, averaged over its surroundings, is largest, 3 `half` apart: inside the
     region, among at least as many struts as is usual."""
-    nodes = np.unique(boundary(mesh)[0])[::4]
+    nodes = np.unique(outer_faces(mesh)[0])[::4]
     tree = cKDTree(mesh.points)
     close = tree.query_ball_point(mesh.points[nodes], half / 3)
     around = np.array([gap[near].mean() for near in close])
