@@ -20,6 +20,7 @@ from addvc.report.words import (
     check_verdicts,
     closing_lines,
     front_page,
+    linked,
     micro_name,
     noise_words,
     state_words,
@@ -227,6 +228,23 @@ def test_the_front_page_holds_a_picture_and_says_what_next(tmp_path):
     assert imread(io.BytesIO(base64.b64decode(data)), format="jpg").shape == (270, 900, 3)
     assert "struts_state5.csv" in sections(page)["What next"]
     assert "scans.states" in sections(front_page(summary(), CONFIG, SCANS))["What next"]
+
+
+def test_figures_that_a_page_names_are_linked_as_snakemake_s_report_knows_them():
+    entries = [
+        {"file": "fig01_states.png", "title": "Fig. 1: states"},
+        {"file": "more_bending.png", "title": "bending or stretching"},
+    ]
+    page = linked('See Fig. 1, not Fig. 11; "bending or stretching" and bending.', entries)
+    targets = "".join(
+        f"\n.. _{entry['file']}: javascript:show('{n}')" for n, entry in enumerate(entries)
+    )
+    tree = docutils.core.publish_doctree(
+        page + "\n" + targets, settings_overrides={"report_level": 5}
+    )
+    found = [(node.astext(), node["refuri"]) for node in tree.findall(docutils.nodes.reference)]
+    assert found == [("Fig. 1", "javascript:show('0')"),
+                     ('"bending or stretching"', "javascript:show('1')")]  # fmt: skip
 
 
 def test_the_front_page_answers_first():

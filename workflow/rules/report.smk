@@ -33,6 +33,7 @@ rule front_page:
     params:
         code=code("report/front_page.py"),
         config=config,
+        entries=ENTRIES,
     script:
         "../scripts/report/front_page.py"
 

@@ -6,7 +6,7 @@ from addvc.runtime import job
 from addvc.images.files import atomic_path, read_json, write_json
 from addvc.provenance import commit
 from addvc.report.thumbnail import thumbnail
-from addvc.report.words import front_page
+from addvc.report.words import front_page, linked
 
 with job(snakemake):
     summary = read_json(snakemake.input.summary)
@@ -15,5 +15,5 @@ with job(snakemake):
     pictures = [thumbnail(path) for path in snakemake.input.picture]
     text = front_page(summary, snakemake.config, scans, *pictures)
     with atomic_path(snakemake.output.page) as temporary:
-        Path(temporary).write_text(text)
+        Path(temporary).write_text(linked(text, snakemake.params.entries))
     write_json(snakemake.output.config, snakemake.config)

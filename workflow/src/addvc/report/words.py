@@ -1,5 +1,6 @@
 """The words that go with the numbers: closing lines in the terminal, front page of the report."""
 
+import re
 import textwrap
 
 import yaml
@@ -126,6 +127,17 @@ def front_page(summary: dict, config: dict, scans: dict, picture: str | None = N
     return "\n".join(lines) + "\n"
 
 
+def linked(page: str, entries: list[dict[str, str]]) -> str:
+    """The page with a link wherever it names a figure or table of the report, {file, title}: `Fig. 3`,
+    or the title in quotes. Snakemake's report knows each by the name of its file."""
+    files = {}
+    for entry in entries:
+        name, colon, _ = entry["title"].partition(":")
+        files[name if colon else f'"{name}"'] = entry["file"]
+    names = "|".join(re.escape(name) for name in files)
+    return re.sub(rf"({names})(?!\d)", lambda m: f"`{m[1]} <{files[m[1]]}_>`__", page)
+
+
 def answer(summary: dict) -> list[str]:
     """What was measured, in a few sentences."""
     size, count = summary["voxel_size_um"], len(summary["states"])
@@ -169,7 +181,7 @@ def what_next(summary: dict) -> list[str]:
         "- Is it right? Fig. 13: specks, but no strut of one colour along a flank. Fig. 16: the carried "
         "struts lie in the outline of the image. What is not so is in doubt, above or `valid` 0 in the "
         "files. A small residual alone is no merit: a result with more unknowns follows more noise.",
-        "- What moved? Fig. 11 and 15, and the scene.",
+        "- What moved? Fig. 11, Fig. 15, and the scene.",
         '- How do struts carry the load? "bending or stretching" and "network of struts" beyond the '
         f"paper; a row for each strut in ``struts_state{last}.csv``, what its columns mean in "
         f"``struts_state{last}.json``.",
