@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from addvc.report import style
 from addvc.report.case import Case
@@ -185,10 +185,10 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
         ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
     ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um)})")
     ax.set_ylabel("risk above its least (%)")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter("{x:g}")
-    ax.xaxis.set_minor_formatter("{x:g}")
-    ax.tick_params(axis="x", which="both", length=3)
+    ax.xaxis.set_minor_locator(NullLocator())
     fig.legend(loc="outside lower center", ncols=2)
     style.save(fig, outputs)
 

@@ -43,7 +43,7 @@ def against_truth(case: Case, outputs: Iterable[str]) -> None:
                                                    strict=True)):  # fmt: skip
             for own, colour in sources.values():
                 pair = (unit * table[name + ending][use] for ending in (truth, own))
-                scatter(ax, *pair, colour, wide=row == 1)
+                scatter(ax, *pair, colour, signed=row == 1)
             title = case.title(state, case.micro[0]).replace(", ", ",\n")
             style.headline(ax, title, count * row + column)
             ax.set_xlabel(("share of bending,\ntruth (–)", "axial strain,\ntruth (%)")[row])
@@ -55,15 +55,16 @@ def against_truth(case: Case, outputs: Iterable[str]) -> None:
     style.save(fig, outputs)
 
 
-def scatter(ax: Axes, true: np.ndarray, measured: np.ndarray, colour: str, wide: bool) -> None:
-    """Measured over true values, from 0 to 1, or, where `wide`, over the range of the true ones and
-    three times that; what is beyond is on the border."""
+def scatter(ax: Axes, true: np.ndarray, measured: np.ndarray, colour: str, signed: bool) -> None:
+    """Measured over true values, from 0 to 1, or, where `signed`, over the range of the true ones; what
+    is beyond is on the border."""
     reach = max(float(np.abs(true).max(initial=0)), 1e-6)
-    x, y = ((-reach, reach), (-3 * reach, 3 * reach)) if wide else ((0, 1), (0, 1))
-    shown = np.clip(measured, *y)
+    span = (-reach, reach) if signed else (0, 1)
+    shown = np.clip(measured, *span)
     ax.plot(true, shown, "o", color=colour, ms=2.2, alpha=0.55, mew=0, clip_on=False)
-    ax.plot(x, x, color="#777777", lw=0.8, zorder=0)
-    ax.set(xlim=x, ylim=y)
+    ax.plot(span, span, color="#777777", lw=0.8, zorder=0)
+    ax.set(xlim=span, ylim=span, box_aspect=1)
+    ax.locator_params(nbins=4)
 
 
 def truth_rows(case: Case) -> list[list[str]]:
