@@ -64,7 +64,7 @@ def scatter(ax: Axes, true: np.ndarray, measured: np.ndarray, colour: str, signe
     ax.plot(true, shown, "o", color=colour, ms=2.2, alpha=0.55, mew=0, clip_on=False)
     ax.plot(span, span, color="#777777", lw=0.8, zorder=0)
     ax.set(xlim=span, ylim=span, box_aspect=1)
-    ax.locator_params(nbins=4)
+    ax.locator_params(nbins=4 if signed else 2)
 
 
 def truth_rows(case: Case) -> list[list[str]]:
