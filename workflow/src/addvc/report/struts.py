@@ -36,24 +36,15 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     if not struts:
         style.save(without_struts(), outputs)
         return
-    points, faces, owner = tubes(struts, junctions)
+    body = tubes(struts, junctions)
     sources = {case.micro[0]: "", case.finest: MESO}
-    fig, axes = style.panels(2, 2, aspect(view, points), spare=13, bar=16)
+    fig, axes = style.panels(2, 2, aspect(view, body[0]), spare=13, bar=16)
     for row, (ax, column) in enumerate(zip(axes, COMPARED, strict=True)):
-        valid = table["valid"] > 0
         norm = Normalize(0, 1) if row == 0 else strain_range(table)
         cmap = style.MAGNITUDE if row == 0 else style.SIGNED
         for panel, (name, suffix) in enumerate(sources.items()):
-            values = np.where(valid, table[column + suffix], np.nan)[owner]
-            trusted = valid[owner] & (owner != FREE_END)
-            known = np.isfinite(values) & trusted
-            layers = [
-                Layer(points, faces[known], values=values[known], norm=norm, cmap=cmap),
-                Layer(points, faces[~trusted & (owner != FREE_END)], colour=style.DOUBT),
-                Layer(points, faces[trusted & ~known], colour=NO_VALUE),
-                Layer(points, faces[owner == FREE_END], colour=GREY),
-            ]
-            render(layers, view, style.WIDTH / 2, points, shadows=True).show(ax[panel])
+            layers = strut_layers(body, table[column + suffix], table["valid"] > 0, norm, cmap)
+            render(layers, view, style.WIDTH / 2, body[0], shadows=True).show(ax[panel])
             style.headline(ax[panel], f"{name}, {case.title(state, name)}", 2 * row + panel)
         label = "share of bending (–)" if row == 0 else "axial strain (–)"
         ends = "neither" if row == 0 else "both"
@@ -67,6 +58,25 @@ def network(case: Case, outputs: Iterable[str]) -> None:
     ]
     fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
+
+
+def strut_layers(
+    body: tuple[np.ndarray, np.ndarray, np.ndarray],
+    values: np.ndarray,
+    valid: np.ndarray,
+    norm: Normalize,
+    cmap: str,
+) -> list[Layer]:
+    """What `tubes` made in the colours of values (s,), nan for none; what is not valid (s,) magenta."""
+    points, faces, owner = body
+    junction, trusted = owner == FREE_END, valid[owner]
+    known = np.isfinite(values[owner]) & trusted & ~junction
+    return [
+        Layer(points, faces[known], values=values[owner][known], norm=norm, cmap=cmap),
+        Layer(points, faces[~trusted & ~junction], colour=style.DOUBT),
+        Layer(points, faces[trusted & ~known & ~junction], colour=NO_VALUE),
+        Layer(points, faces[junction], colour=GREY),
+    ]
 
 
 def without_struts() -> Figure:
