@@ -47,11 +47,15 @@ PRECISE = 1e-2
 
 @dataclass(frozen=True)
 class Ladder:
-    """Powers of RATIO, on the l_E of the configuration, to choose from; the noise of an image; draws."""
+    """Powers of RATIO, on the l_E of the configuration, to choose from; the noise of an image; draws.
+
+    Beyond the longest the motion of nodes gains little, while the energy, which knows of no load on the
+    ends of the mesh, undoes part of the compression: on the default twin at 3.4 % with 2 / 3 / 4 rungs
+    .070 / .063 / .061 voxel rms, and the strain of cells is .0003 / .0004 / .0008 too small."""
 
     noise: Noise
     shortest: int = -5
-    longest: int = 6
+    longest: int = 3
     draws: int = 1
 
 
