@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from addvc.errors import ScanError
-from addvc.images.grey import Levels, grey_levels, matched
+from addvc.images.grey import Levels, corrected, grey_levels, matched
 
 AXIS = 1
 NOISE = 4.0
@@ -44,6 +44,24 @@ def test_drift_is_undone(foam, gain, offset):
     found = matched(drifted, grey_levels(drifted, AXIS), grey_levels(reference, AXIS))
     assert found.dtype == np.float32
     assert_allclose(found, state, atol=0.02 * 180)
+
+
+@pytest.mark.parametrize(
+    ("shift", "found"), [(0.0, False), (0.1, False), (1.0, True), (-1.0, True)]
+)
+def test_by_itself_a_clear_drift_alone_is_undone(foam, shift, found, caplog):
+    """A quarter of the noise is clear, a fortieth is not."""
+    reference, state = foam(0.1), foam(0.15) + np.float32(shift)
+    same = corrected(state, reference, AXIS, "auto")
+    assert ("brought to these" in caplog.text) == found == (same is not state)
+    assert_allclose(grey_levels(same, AXIS).void, grey_levels(reference, AXIS).void, atol=0.15)
+
+
+def test_by_itself_what_cannot_be_told_is_left(foam):
+    blank = np.full((20, 20, 20), 7, np.float32)
+    assert corrected(blank, foam(0.1), AXIS, "auto") is blank
+    with pytest.raises(ScanError, match="all the same"):
+        corrected(blank, foam(0.1), AXIS, "global")
 
 
 def test_another_scan_altogether_is_refused(foam):

@@ -1,6 +1,7 @@
 """Scans: every format gives the same voxels, streamed or whole; every defect is named."""
 
 import os
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -9,6 +10,7 @@ import SimpleITK as sitk
 import tifffile
 import zarr
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.ndimage import gaussian_filter
 
 import addvc.images.scans as scans
 from addvc.images.files import atomic_path
@@ -301,6 +303,38 @@ def test_zarr_array_is_chosen_or_asked_for(tmp_path, volume, pages):
     (tmp_path / "empty.zarr").mkdir()
     with pytest.raises(ScanError, match="not a readable Zarr folder"):
         open_scan(tmp_path / "empty.zarr")
+
+
+@pytest.fixture
+def blobs(tmp_path, rng):
+    """blobs(dtype): a raw scan (14, 20, 26) of smooth grey levels in some noise, big endian."""
+
+    def make(dtype):
+        grey = gaussian_filter(rng.standard_normal((14, 20, 26)), 2.0)
+        grey = 20000 + 8000 * grey / grey.std() + 1000 * rng.standard_normal(grey.shape)
+        (tmp_path / "scan.raw").write_bytes(
+            grey.astype(np.dtype(dtype).newbyteorder(">")).tobytes()
+        )
+        return tmp_path / "scan.raw"
+
+    return make
+
+
+@pytest.mark.parametrize("dtype", ["uint16", "float32"])
+def test_a_raw_scan_in_the_other_byte_order_is_told_by_its_looks(blobs, dtype):
+    right = ScanFormat(shape=(14, 20, 26), dtype=dtype, byte_order="big")
+    assert open_scan(blobs(dtype), right).shape == (26, 20, 14)
+    expect("with big by .*say byte_order: big", blobs(dtype), replace(right, byte_order="little"))
+
+
+def test_a_raw_scan_with_its_sizes_in_another_order_is_told_by_its_looks(blobs):
+    wrong = ScanFormat(shape=(26, 20, 14), dtype="uint16", byte_order="big")
+    expect(r"with \[14, 20, 26\] by .*in the order of axes, 'zyx'", blobs("uint16"), wrong)
+
+
+def test_a_type_with_its_byte_order_is_refused(blobs):
+    both = ScanFormat(shape=(14, 20, 26), dtype=">u2")
+    expect("say dtype: uint16 and byte_order: big", blobs("uint16"), both)
 
 
 def test_raw_size_names_both_counts_and_a_type_that_fits(tmp_path, pages):

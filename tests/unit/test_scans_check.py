@@ -170,5 +170,5 @@ def test_a_slab_outside_the_image_is_refused(tmp_path, pages, slab):
     np.save(tmp_path / "a.npy", pages)
     known = config(tmp_path / "a.npy")
     assert check_headers(known | {"micro": {"region": {"low": 30, "high": 99}}})
-    with pytest.raises(ConfigError, match=r"micro.region goes from .* image from 0 to 37 along"):
+    with pytest.raises(ConfigError, match=r"micro.region \(.*\) lies outside .* 0 to 37 along"):
         check_headers(known | {"micro": {"region": slab}})

@@ -124,6 +124,17 @@ def test_a_residual_far_above_the_noise_has_a_warning(alone, warned):
     assert ("1.6 times that of noise alone (at most 1.5)" in told) == warned
 
 
+@pytest.mark.parametrize(
+    ("alone", "shortest", "words"),
+    [(0.523, True, "the shortest that may be chosen"), (0.9, False, "far below that of noise"),
+     (0.523, False, None)],
+)  # fmt: skip
+def test_a_result_that_follows_the_noise_has_a_warning(alone, shortest, words):
+    micro = GOOD["micro"] | {"shortest_l_e": shortest, "l_e": 2.9}
+    told = " ".join(warnings(summary(GOOD | {"noise_std": alone, "micro": micro})))
+    assert ("follows the noise" in told) == (words is not None) and (words or "") in told
+
+
 @pytest.mark.parametrize(("share", "warned"), [(0.0, False), (0.01, False), (0.022, True)])
 def test_elements_turned_inside_out_have_a_warning(share, warned):
     folded = GOOD | {"meso12": GOOD["meso12"] | {"inverted": share}}
@@ -361,7 +372,7 @@ def test_a_state_that_is_not_converged_has_a_warning(one, words):
 def test_a_meso_loop_that_did_not_end_has_a_warning():
     one = copy.deepcopy(GOOD)
     one["meso12"] = found(converged=False)
-    assert "State 1, meso12: the loop did not end in 40 iterations" in warnings(summary(one))[0]
+    assert "State 1, meso12: the loop did not end, after 40 iterations" in warnings(summary(one))[0]
 
 
 @pytest.mark.parametrize(("flagged", "warned"), [(9, False), (15, True)])

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from addvc import __version__
+from addvc.analysis.strut_table import RAW
 from addvc.analysis.validity import verdict
+from addvc.correlation.cutoff import Ladder
 from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_vtu
 from addvc.images.files import read_json
@@ -122,13 +124,19 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
         "micro_candidates": micro_notes["candidates"],
         "freeform": freeform_figures(folder, state, scope.truth) if scope.freeform else None,
         "verdict": verdict(best["converged"], best["valid_nodes"]),
-        "struts": struts["foam"][micro],
+        "struts": struts["foam"][micro] | raw_share(struts["foam"], micro),
         "equilibrium": struts["equilibrium"],
         "uncertainty": read_json(folder / f"analysis/uncertainty_state{state}.json"),
         "warp": read_json(folder / f"analysis/warp_state{state}.json"),
         "cells": read_json(folder / f"cells_state{state}.json")["localisation"],
         "noise_std": read_json(folder / "analysis/image_noise.json")[str(state)],
     }
+
+
+def raw_share(foam: dict, micro: str) -> dict:
+    """The share of bending of the displacement as measured, where it is not that of the struts."""
+    raw = foam.get(micro + RAW)
+    return {} if raw is None else {"bending_share_raw": raw["bending_share"]}
 
 
 def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
@@ -142,6 +150,7 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
         "inverted": notes["inverted"],
         "start": notes.get("best"),
         "l_e": notes.get("l_e"),
+        "shortest_l_e": is_shortest(notes.get("risk", [])),
         "torn": notes.get("torn", []),
         "l_l": notes.get("l_l"),
         "converged": solution.converged,
@@ -153,6 +162,11 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
         "seconds": solution.seconds,
         "error": read_json(folder / f"analysis/error_{name}.json") if truth else None,
     }
+
+
+def is_shortest(trials: list[dict]) -> bool:
+    """Whether the least risk of the trials of l_E is on the shortest rung of the ladder."""
+    return bool(trials) and min(trials, key=lambda t: t["risk"])["rung"] == Ladder.shortest
 
 
 def freeform_figures(folder: Path, state: int, truth: bool) -> dict:

@@ -21,10 +21,10 @@ from addvc.images.scans_formats import (
     is_pattern,
     open_hdf5,
     open_npy,
-    open_raw,
 )
 from addvc.images.scans_itk import SUFFIXES as ITK_SUFFIXES
 from addvc.images.scans_itk import open_itk
+from addvc.images.scans_raw import open_raw
 from addvc.images.scans_store import load_volume, save_volume
 from addvc.images.scans_tiff import open_stack, open_tiff
 from addvc.images.scans_zarr import open_zarr

@@ -94,11 +94,11 @@ def spacing_words(spacing: float | None, voxel_um: float) -> str:
 def check_slab(region: str | dict, length: int) -> None:
     """ConfigError where the slab of `micro.region` lies outside an image of this length (voxels)."""
     wanted = {} if region == "all" else region
-    low, high = wanted.get("low", 0), wanted.get("high", length)
-    if low >= length or high <= 0:
+    if wanted.get("low", 0) >= length or wanted.get("high", length) <= 0:
+        given = ", ".join(f"{key} = {wanted[key]:g}" for key in ("low", "high") if key in wanted)
         raise ConfigError(
-            f"micro.region goes from {low:g} to {high:g}, but the image from 0 to {length} along the "
-            "loading axis (voxels once cropped and binned): give a slab within that"
+            f"micro.region ({given}) lies outside of the image, which goes from 0 to {length} along the "
+            "loading axis (voxels once cropped and binned, not micrometres): give a slab within that"
         )
 
 

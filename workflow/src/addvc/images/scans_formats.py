@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from addvc.errors import ScanError
 
-COMMON_DTYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
-
 
 @dataclass(frozen=True)
 class ScanFormat:
@@ -61,67 +59,6 @@ def natural_key(name: str) -> list[tuple[int, int | str]]:
     """Sort key by which 'scan_9' comes before 'scan_10'."""
     parts = re.split(r"(\d+)", name)
     return [(0, int(part)) if part.isdigit() else (1, part) for part in parts if part]
-
-
-def open_raw(path: Path, fmt: ScanFormat) -> Source:
-    """A headerless array: header_bytes, then product(shape) values of `dtype`.
-
-    Raises ScanError when shape or dtype is missing or impossible, byte_order unknown or header_bytes
-    negative, or when the file is not exactly as long as they say.
-    """
-    if fmt.shape is None or fmt.dtype is None:
-        raise ScanError(
-            f"{path}: a {path.suffix} file does not say what it holds; give scans.shape (three "
-            f"sizes in the order of axes, '{fmt.axes}') and scans.dtype (such as uint16)"
-        )
-    shape, dtype = tuple(int(n) for n in fmt.shape), _raw_dtype(path, fmt)
-    if len(shape) != 3 or min(shape) < 1 or fmt.header_bytes < 0:
-        raise ScanError(
-            f"{path}: shape {fmt.shape} with header_bytes {fmt.header_bytes}; "
-            "give three sizes of at least 1 and a header of at least 0 bytes"
-        )
-    _check_raw_size(path, fmt, shape, dtype)
-    page = int(np.prod(shape[1:]))
-
-    def read(start: int, stop: int) -> NDArray:
-        offset = fmt.header_bytes + start * page * dtype.itemsize
-        values = np.fromfile(path, dtype, count=(stop - start) * page, offset=offset)
-        return values.reshape(stop - start, *shape[1:])
-
-    return Source(shape, dtype, read, (path,))
-
-
-def _raw_dtype(path: Path, fmt: ScanFormat) -> np.dtype:
-    """The grey type of a raw file, byte order included."""
-    if fmt.byte_order not in ("little", "big"):
-        raise ScanError(f"{path}: byte_order is '{fmt.byte_order}'; use 'little' or 'big'")
-    try:
-        return np.dtype(fmt.dtype).newbyteorder({"little": "<", "big": ">"}[fmt.byte_order])
-    except TypeError as error:
-        raise ScanError(
-            f"{path}: dtype '{fmt.dtype}' is unknown; use one of {', '.join(COMMON_DTYPES)}"
-        ) from error
-
-
-def _check_raw_size(path: Path, fmt: ScanFormat, shape: tuple[int, ...], dtype: np.dtype) -> None:
-    """The file must hold exactly the header and the voxels."""
-    found, voxels = path.stat().st_size, int(np.prod(shape))
-    expected = fmt.header_bytes + voxels * dtype.itemsize
-    if found == expected:
-        return
-    others = [
-        name
-        for name in COMMON_DTYPES
-        if fmt.header_bytes + voxels * np.dtype(name).itemsize == found
-    ]
-    hint = f"; the size would fit dtype {' or '.join(others)}" if others else ""
-    if not others and found > expected:
-        hint = f"; a header of {found - voxels * dtype.itemsize} bytes would fit"
-    raise ScanError(
-        f"{path}: expected {expected} bytes (header {fmt.header_bytes} + shape {shape} of "
-        f"{dtype.name}), found {found}; correct scans.shape, dtype or header_bytes, "
-        f"or copy the file again{hint}"
-    )
 
 
 def open_npy(path: Path, fmt: ScanFormat) -> Source:

@@ -5,6 +5,9 @@ from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
+NOISE_OVER = (
+    1.4  # that over sigma(r): micro DVC of the twin has 1.06, Eq. 10 with its short l_K 1.2
+)
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
 
 
@@ -105,7 +108,8 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
             "have a residual far above the noise of the images."
         )
     found += fold_warnings(state, summary) + torn_warnings(state, micro)
-    return found + equilibrium_warnings(state) + residual_warnings(state, micro)
+    found += equilibrium_warnings(state) + residual_warnings(state, micro)
+    return found + noise_warnings(state, micro)
 
 
 def loop_warnings(state: dict, mesh: str) -> list[str]:
@@ -114,8 +118,8 @@ def loop_warnings(state: dict, mesh: str) -> list[str]:
     if one["converged"]:
         return []
     return [
-        f"- State {state['state']}, {mesh}: the loop did not end in {one['iterations']} iterations "
-        f"(last rms(du) {figure(one['last_step'], '.1e')} voxel). Look at the residual maps "
+        f"- State {state['state']}, {mesh}: the loop did not end, after {one['iterations']} iterations "
+        f"in all (last rms(du) {figure(one['last_step'], '.1e')} voxel). Look at the residual maps "
         "(Fig. 13); a longer regularisation length or a better start may help."
     ]
 
@@ -199,6 +203,25 @@ def residual_warnings(state: dict, micro: str) -> list[str]:
         f"levels, {sigma / alone:.1f} times that of noise alone (at most {NOISE_TIMES:g}): some struts "
         "are not where they were put, or the contrast of the scans differs. Look at Fig. 13 for where, "
         "leave out what is not `valid`; raise micro.mending, or say images.grey: global."
+    ]
+
+
+def noise_warnings(state: dict, micro: str) -> list[str]:
+    """One line where micro DVC follows whatever the images show, noise too."""
+    sigma, alone = state[micro]["residual_std"], state.get("noise_std")
+    if state[micro].get("shortest_l_e"):
+        why = f"its l_E is {state[micro]['l_e']:.2g} voxels, the shortest that may be chosen"
+    elif sigma is not None and alone is not None and sigma < alone / NOISE_OVER:
+        why = (
+            f"its residual, {sigma:.2f} grey levels, is far below that of noise alone, {alone:.2f}"
+        )
+    else:
+        return []
+    return [
+        f"- State {state['state']}, {micro}: it follows the noise, since {why}. Scans that differ by "
+        "more than noise, a start far off, or struts that do not move as elastic ones ask for that. "
+        "Believe no strain of single struts; look at Fig. 13, say images.grey: global, or set micro.l_e "
+        "to a cell size and compare."
     ]
 
 

@@ -39,8 +39,9 @@ TERMS = (
     "A node is *valid* where the residual around it is what noise explains, off torn bridges, else "
     "*in doubt* (`valid` 0 in the files). A strut is *flagged* where the threshold broke it, over 30 % "
     "of it is in doubt, it lies far from equilibrium, or moves unlike a beam (`flag` in the table of "
-    "struts). A state is *converged* where the loop ended and at most 5 % of the nodes are in doubt; in "
-    "figures that is said of the loop alone, and *inverted* is the share of elements that a "
+    "struts). A state is *converged* where the loop ended and at most 5 % of the nodes are in doubt, "
+    "*measured, with doubtful places* (`flagged` in summary.json) where not, *failed* where half are; "
+    "in figures that is said of the loop alone, and *inverted* is the share of elements that a "
     "displacement turns inside out, where it is over 1 %. The compression measured is by how "
     "much the end faces of the finest mesh of meso DVC come nearer, over their distance."
 )
@@ -259,7 +260,9 @@ def strut_words(struts: dict | None) -> str:
     doubt = struts.get("bending_share_std")
     more = f" (standard deviation {doubt:.1%})" if doubt else ""
     share = f"{struts['bending_share']:.0%}{more} of the energy of {count} is in bending"
-    return f" {verdict}-dominated: {share}."
+    raw = struts.get("bending_share_raw")
+    measured = "" if raw is None else f", {raw:.0%} before equilibrium takes noise off"
+    return f" {verdict}-dominated: {share}{measured}."
 
 
 def band_words(cells: dict | None) -> str:
