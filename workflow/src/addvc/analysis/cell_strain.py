@@ -26,6 +26,14 @@ FLAT = 0.05
 plane or on a line, which have no gradient across them."""
 
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
+COLUMNS = {
+    "x, y, z": ("voxel", "point of the grid, middle of a window one cell wide, in the reference"),
+    "axial_strain": ("–", "stretch along the loading axis less 1"),
+    "e_xx, e_yy, e_zz, e_yz, e_xz, e_xy": ("–", "Green-Lagrange strain, e_yz half of the shear"),
+    "volume_ratio": ("–", "volume over that at rest"),
+}
+"""Of the table, with their units; nan where too little of the solid is known."""
+
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 

@@ -232,6 +232,10 @@ def foam(columns: dict[str, Sequence], suffix: str = "") -> dict:
 def described(suffixes: Sequence[str]) -> dict[str, dict[str, str]]:
     """Unit and meaning of every column of the table."""
     columns = {**GEOMETRY}
+    whose = {MESO: "; by the finest meso mesh", RAW: "; of the displacement as measured"}
     for suffix in suffixes:
-        columns |= {name + suffix: value for name, value in MECHANICS.items()}
+        columns |= {
+            name + suffix: (unit, text + whose.get(suffix, ""))
+            for name, (unit, text) in MECHANICS.items()
+        }
     return {name: {"unit": unit, "meaning": text} for name, (unit, text) in columns.items()}

@@ -180,7 +180,9 @@ def _outcome(case: Case, name: str) -> dict[str, str]:
         label = case.labels[state]
         rows[f"Iterations, {label}"] = str(solution.iterations)
         rows[f"Verdict, {label}"] = case.verdict(name, state)
-        rows[f"σ(r), {label} (grey levels)"] = f"{solution.residual['std']:.3f}"
+        rows[f"σ(r) at the points of the mesh, {label} (grey levels)"] = (
+            f"{solution.residual['std']:.3f}"
+        )
     return rows
 
 
