@@ -17,8 +17,8 @@ The search climbs a ladder of l_E, then goes down it, as long as the risk falls:
 linear step from a u that a stage has found, with conjugate gradients preconditioned by its factor.
 
 On the default twin, rms error in voxels with l_E = 0.8 cell size in all states and with the one
-chosen: .090 / .069, .093 / .076, .109 / .103 at 3.4, 5.2, 12.3 % (l_E of 52, 52 and 35 voxels); where
-every strut moves on its own (benchmarks, `strut`) .544 / .423 (3 voxels).
+chosen: .090 / .063, .093 / .073, .109 / .104 at 3.4, 5.2, 12.3 % (l_E of 78, 78 and 35 voxels); where
+every strut moves on its own (benchmarks, `strut`) .544 / .421 (3 voxels).
 """
 
 import logging
@@ -38,8 +38,8 @@ from addvc.fem.assembly import node_pattern
 log = logging.getLogger(__name__)
 
 RATIO = 1.5
-"""Of neighbouring l_E: the risk is flat about its least. At 12.3 % on the default twin the error is
-.109, .107 and .115 voxel one rung below it, there, and one above."""
+"""Of neighbouring l_E: the risk is flat about its least. At 3.4 % on the default twin the error is .070
+voxel one rung below what is chosen, .063 there and .061 one above."""
 
 PRECISE = 1e-2
 """Relative tolerance of the steps: risks differ by tenths."""
