@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addvc.analysis.cell_strain import cell_strain, columns, window
+from addvc.analysis.cell_strain import cell_strain, columns, described, window
 from addvc.analysis.localisation import LEAST_STRAIN, compared, localisation
 from addvc.fem.mesh import cell_volumes, nodal_volumes
 from addvc.report.cells import across, grid_of, profile
@@ -84,6 +84,7 @@ def test_beyond_the_specimen_and_of_a_plane_nothing_is_known(cloud):
 def test_the_table_has_a_row_a_point(cloud):
     strain = found(cloud, cloud.points @ EVERY.T)
     table = columns(strain, 1)
+    assert list(described()) == list(table)
     lines, axial = grid_of(table)
     assert np.array_equal(axial, strain.along(1), equal_nan=True)
     assert np.allclose(lines[0], strain.points[:, 0, 0, 0])

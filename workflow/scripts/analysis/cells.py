@@ -1,7 +1,7 @@
 """Strain at the scale of a cell in one state, and the bands in which it gathers."""
 
 from addvc.runtime import job, told
-from addvc.analysis.cell_strain import COLUMNS, cell_strain, columns
+from addvc.analysis.cell_strain import cell_strain, columns, described
 from addvc.analysis.localisation import MEANING, localisation
 from addvc.analysis.strut_store import write_columns
 from addvc.fem.io import read_mesh, read_vtu
@@ -17,5 +17,5 @@ with job(snakemake) as log:
     figures = localisation(found.points, found.along(axis), axis)
     log.info(told(figures))
     write_columns(snakemake.output.table, columns(found, axis))
-    notes = {"localisation": figures, "meaning": MEANING, "columns": COLUMNS}
+    notes = {"localisation": figures, "meaning": MEANING, "columns": described()}
     write_json(snakemake.output.notes, notes)

@@ -27,13 +27,13 @@ plane or on a line, which have no gradient across them."""
 
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
 COLUMNS = {
-    "x, y, z": ("voxel", "point of the grid, middle of a window one cell wide, in the reference"),
+    **dict.fromkeys(
+        "xyz", ("voxel", "point of the grid, middle of a window one cell wide, at rest")
+    ),
     "axial_strain": ("–", "stretch along the loading axis less 1"),
-    "e_xx, e_yy, e_zz, e_yz, e_xz, e_xy": ("–", "Green-Lagrange strain, e_yz half of the shear"),
+    **dict.fromkeys([f"e_{name}" for name in COMPONENTS], ("–", "Green-Lagrange strain")),
     "volume_ratio": ("–", "volume over that at rest"),
 }
-"""Of the table, with their units; nan where too little of the solid is known."""
-
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
@@ -109,6 +109,11 @@ def gradient(
     if np.linalg.norm(middle) > OFF_CENTRE * cell_size or values[0] < FLAT * values[2]:
         return unknown
     return np.linalg.solve(second, (w * x.T) @ v).T
+
+
+def described() -> dict[str, dict[str, str]]:
+    """Unit and meaning of each of the `columns`."""
+    return {name: {"unit": unit, "meaning": text} for name, (unit, text) in COLUMNS.items()}
 
 
 def columns(strain: CellStrain, axis: int) -> dict[str, np.ndarray]:

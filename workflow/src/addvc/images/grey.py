@@ -3,8 +3,8 @@
 Two levels are compared, those of void and of solid: the interquartile means (of whole grey levels,
 medians go in steps) of the two classes that the intermeans threshold (Ridler & Calvard 1978) makes of
 the voxels between the platens. They do not depend on how many voxels are solid, which compression
-changes. Where little is solid there are several such
-thresholds, the lower ones within the noise of the void: the highest counts.
+changes. Where little is solid there are several such thresholds, the lower ones within the noise of
+the void: the highest counts.
 
 A drift matters more than it looks, since robust weights and l_E take the noise for all there is: with
 the void of the solid twin at 15 % brighter by 2.8 % of the contrast (.6 of its noise) micro DVC chose an
@@ -28,9 +28,7 @@ LEAST = 0.2  # of the reference's contrast: less is no scan of the same foam
 SAMPLES = 2_000_000  # voxels that are enough for two medians
 CLEAR = 2.0  # deviations of the void that the threshold is above it, at least
 DRIFT = 0.1  # of the noise of the void: what brightness may drift by; twins have at most .05
-GAIN = (
-    0.25  # what the contrast may differ by: thin struts that thicken (benchmarks, `band`) have .18
-)
+GAIN = 0.25  # what the contrast may differ by: thin struts that thicken (`band`) have .18
 MIDDLE = 0.25  # of a class, at either end, is left out of its level
 
 

@@ -51,17 +51,19 @@ def _raw_dtype(path: Path, fmt: ScanFormat) -> np.dtype:
     """The grey type of a raw file, byte order included."""
     if fmt.byte_order not in ("little", "big"):
         raise ScanError(f"{path}: byte_order is '{fmt.byte_order}'; use 'little' or 'big'")
-    if fmt.dtype[:1] in "<>=|":
-        raise ScanError(
-            f"{path}: dtype is '{fmt.dtype}', a byte order and a type in one; say dtype: "
-            f"{np.dtype(fmt.dtype).name} and byte_order: {'big' if fmt.dtype[0] == '>' else 'little'}"
-        )
     try:
-        return np.dtype(fmt.dtype).newbyteorder({"little": "<", "big": ">"}[fmt.byte_order])
+        dtype = np.dtype(fmt.dtype)
     except TypeError as error:
         raise ScanError(
             f"{path}: dtype '{fmt.dtype}' is unknown; use one of {', '.join(COMMON_DTYPES)}"
         ) from error
+    if fmt.dtype.startswith(("<", ">")):
+        order = "big" if fmt.dtype[0] == ">" else "little"
+        raise ScanError(
+            f"{path}: dtype is '{fmt.dtype}', a byte order and a type in one; say dtype: {dtype.name} "
+            f"and byte_order: {order}"
+        )
+    return dtype.newbyteorder({"little": "<", "big": ">"}[fmt.byte_order])
 
 
 def _check_raw_size(path: Path, fmt: ScanFormat, shape: tuple[int, ...], dtype: np.dtype) -> None:
