@@ -45,6 +45,18 @@ def config(**micro):
     return given
 
 
+@pytest.mark.parametrize(
+    ("grey", "words"),
+    [("none", None), ("auto", "had clearly drifted, blurred"), ("global", "reference, blurred")],
+)
+def test_what_was_done_to_grey_levels_is_told(grey, words):
+    settings = config(methods=["corotational"])
+    settings["images"]["grey"] = grey
+    text = told(settings)
+    assert (words or "were blurred") in text
+    assert ("brought to the brightness" in text) == (words is not None)
+
+
 def told(settings, *states):
     return "\n".join(methods(summary(*states or (state(1), state(2))), settings, SCANS))
 

@@ -28,6 +28,14 @@ def methods(summary: dict, config: dict, scans: dict) -> list[str]:
     return [*lines, ""]
 
 
+GREY = {
+    "none": "",
+    "auto": "brought to the brightness and contrast of the reference where these had clearly drifted, ",
+    "global": "brought to the brightness and contrast of the reference, ",
+}
+"""What was done to the scans before the blur, by `images.grey`."""
+
+
 def listing(words: list[str], last: str = "and") -> str:
     """a, b and c."""
     return f" {last} ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
@@ -52,9 +60,9 @@ def images(summary: dict, config: dict, scans: dict) -> str:
         f"with addvc {versions['addvc']} (commit {versions['commit']}), a Snakemake "
         f"workflow {{snakemake}}. The scans ({len(summary['states']) + 1}, of {size} voxels of "
         f"{summary['voxel_size_um'] / factor:g} micrometres{binned if factor > 1 else ''}) were "
-        f"blurred by a Gaussian of {config['images']['blur']:g} voxel and evaluated "
-        f"between voxels by B-splines of degree {config['images']['degree']} {{spline}}; lengths "
-        "are in these voxels. The cell size, "
+        f"{GREY[config['images']['grey']]}blurred by a Gaussian of {config['images']['blur']:g} voxel "
+        f"and evaluated between voxels by B-splines of degree {config['images']['degree']} "
+        "{spline}; lengths are in these voxels. The cell size, "
         f"{cell if geometry['cell_size'] == 'auto' else ''}is {summary['cell_size']:.1f} "
         "voxels; the threshold between void and solid, "
         f"{level if geometry['threshold'] == 'auto' else ''}is "
