@@ -369,6 +369,12 @@ def test_a_state_that_is_not_converged_has_a_warning(one, words):
         assert word in found
 
 
+def test_what_is_wrong_with_micro_dvc_is_told_before_other_meshes():
+    one = GOOD | {"meso12": found(converged=False), "micro": found(converged=False)}
+    told = [line for line in warnings(summary(one)) if "did not end" in line]
+    assert ["micro:" in line for line in told] == [True, False]
+
+
 def test_a_meso_loop_that_did_not_end_has_a_warning():
     one = copy.deepcopy(GOOD)
     one["meso12"] = found(converged=False)

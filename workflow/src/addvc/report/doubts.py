@@ -98,10 +98,9 @@ def topology_warnings(counts: dict | None) -> list[str]:
 
 
 def state_warnings(state: dict, summary: dict) -> list[str]:
-    """What to distrust of one state: loops that did not end, nodes in doubt, a failure."""
+    """What to distrust of one state: first of the default micro method, then the loops of the others."""
     micro = micro_name(summary)
-    found = [line for mesh in summary["meshes"] for line in loop_warnings(state, mesh)]
-    found += doubt_warnings(state, micro) + flag_warnings(state)
+    found = loop_warnings(state, micro) + doubt_warnings(state, micro) + flag_warnings(state)
     if state["verdict"] == "failed":
         found.append(
             f"- State {state['state']} could not be registered: at least half of its nodes "
@@ -109,7 +108,9 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
         )
     found += fold_warnings(state, summary) + torn_warnings(state, micro)
     found += equilibrium_warnings(state) + residual_warnings(state, micro)
-    return found + noise_warnings(state, micro)
+    found += noise_warnings(state, micro)
+    others = (mesh for mesh in summary["meshes"] if mesh != micro)
+    return found + [line for mesh in others for line in loop_warnings(state, mesh)]
 
 
 def loop_warnings(state: dict, mesh: str) -> list[str]:
