@@ -40,8 +40,6 @@ SHORTEST = -2
 """Of the ladder of l_L: on shorter rungs, which the images of large strains ask for, the least risk is
 that of a mesh that follows single struts (default twin: the error of meso 12 at 12.3 % is .466 voxel
 with 0.6 of the edge, .375 here, .385 three rungs on)."""
-LONGEST = 2
-"""On a smooth field (benchmarks, `band`) four rungs on the error is .083 voxel, not .073."""
 
 ONCE_MORE = 30  # iterations with another l_L, at most
 START_VOXELS = 2e6  # a start is coarse: more voxels would take memory and give nothing
@@ -164,7 +162,7 @@ def cutoff_ladder(section: dict, levels: dict, blur: float) -> Ladder | None:
     pre-filter `blur` (voxels); None where it is given."""
     if section["l_l"] != "auto":
         return None
-    return Ladder(Noise(levels["noise"], blur), SHORTEST, LONGEST)
+    return Ladder(Noise(levels["noise"], blur), shortest=SHORTEST)
 
 
 def meso_dvc(
