@@ -5,9 +5,7 @@ from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
-NOISE_OVER = (
-    1.4  # that over sigma(r): micro DVC of the twin has 1.06, Eq. 10 with its short l_K 1.2
-)
+NOISE_OVER = 1.4  # that over sigma(r): micro DVC of the twin has 1.1, Eq. 10 1.2
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
 
 
