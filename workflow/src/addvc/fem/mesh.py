@@ -86,7 +86,7 @@ def boundary_faces(mesh: Mesh) -> np.ndarray:
 
 
 def outer_faces(mesh: Mesh, keep: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The boundary faces (f, 3 | 4) of the cells where `keep` (m,) is true, and the cell (f,) of each."""
+    """Boundary faces (f, 3 | 4) of the cells where `keep` (m,) is true, and the cell (f,) of each."""
     chosen = np.arange(len(mesh.cells)) if keep is None else np.flatnonzero(keep)
     table = TET_FACES if mesh.is_tet else HEX_FACES
     faces = mesh.cells[chosen][:, table].reshape(-1, table.shape[1])
