@@ -49,11 +49,12 @@ def corotational(
 ) -> tuple[Solution, dict]:
     """Stages one after the other from u (n, 3); I_d by its spline coefficients (nx, ny, nz).
 
-    Before the last of several come mending and, where there is a ladder, the choice of l_E; what is
-    then in doubt does not count in the last. The solution has the history of all stages and converged
-    if the last one did; of the notes, `stages` has a row of figures for each, `c` and `l_e` are the
-    weight of the energy and its cut-off in the end, `risk` the trials of l_E, all in grey levels^2 over
-    the points; `torn`: where bridges are cut (voxels), `torn_cells`: the cells that this goes across."""
+    Before the last of several come mending and, where there is a ladder, the choice of l_E, with
+    bridges of stiffness BRIDGE from then on; what is then in doubt does not count in the last. The
+    solution has the history of all stages and converged if the last one did; of the notes, `stages` has
+    a row of figures for each, `c` and `l_e` are the weight of the energy and its cut-off in the end,
+    `risk` the trials of l_E, all in grey levels^2 over the points; `torn`: where bridges are cut
+    (voxels), `torn_cells`: the cells that this goes across."""
     *before, last = stages
     done: list[Step] = []
     trials: list[dict] = []

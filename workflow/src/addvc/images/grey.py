@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 MARGIN = 3  # voxels off the platens, whose faces are blurred
 LEAST = 0.2  # of the reference's contrast: less is no scan of the same foam
-SAMPLES = 2_000_000  # voxels that are enough for two medians
+SAMPLES = 2_000_000  # voxels that are enough for two levels
 CLEAR = 2.0  # deviations of the void that the threshold is above it, at least
 DRIFT = 0.1  # of the noise of the void: what brightness may drift by; twins have at most .05
 GAIN = 0.25  # what the contrast may differ by: thin struts that thicken (`band`) have .18

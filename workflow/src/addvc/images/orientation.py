@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from addvc.errors import GeometryError
-from addvc.images.platens import find_platens
+from addvc.images.platens import find_platens, seen
 
 AXES = "xyz"
 LEAST_SHARE = 0.25  # of the image across the loading axis: who scans fills the image
@@ -18,7 +18,7 @@ def check_no_platens_elsewhere(volume: NDArray, axis: int) -> None:
     of another axis. One alone is no sign: a specimen may lie on a table."""
     for other in sorted({0, 1, 2} - {axis}):
         faces = find_platens(volume, other)
-        if faces and faces[0] > -0.5 and faces[1] < volume.shape[other] - 0.5:
+        if faces and all(seen(faces, volume.shape[other])):
             raise GeometryError(
                 f"no platen along {AXES[axis]}, the loading axis, but clear ones along {AXES[other]}, "
                 f"with faces at {faces[0]:.1f} and {faces[1]:.1f} of {volume.shape[other]} voxels: say "

@@ -41,9 +41,13 @@ def moved_faces(
     before, after = find_platens(reference, axis), find_platens(deformed, axis)
     if before is None or after is None:
         return None
-    ends = -0.5, reference.shape[axis] - 0.5
-    seen = [tuple(face != end for face, end in zip(p, ends, strict=True)) for p in (before, after)]
-    return (before, after) if seen[0] == seen[1] else None
+    n = reference.shape[axis]
+    return (before, after) if seen(before, n) == seen(after, n) else None
+
+
+def seen(faces: tuple[float, float], n: int) -> tuple[bool, bool]:
+    """Which of both faces are those of a platen, and not the ends of an image of n rows."""
+    return faces[0] > -0.5, faces[1] < n - 0.5
 
 
 def _row_profiles(volume: NDArray, axis: int) -> tuple[NDArray, NDArray, float]:

@@ -11,10 +11,8 @@ from addvc.errors import ScanError
 from addvc.images.scans_formats import ScanFormat, Source
 
 COMMON_DTYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
-PAGES = 4  # in the middle of a scan, that are looked at
-LIKELIER = (
-    0.7  # of how unlike neighbours are, where another order of bytes or sizes is meant, at most
-)
+PAGES, VALUES = 4, 1_000_000  # in the middle of a scan, that are looked at; at least a page
+LIKELIER = 0.7  # of how unlike neighbours are where another order is meant, at most
 MOST_HEADER = 65536  # bytes that a header may be thought to have
 
 
@@ -116,9 +114,10 @@ def unlike(flat: NDArray, shape: Sequence[int]) -> tuple[float, float]:
     mean absolute differences over the mean absolute deviation of all; 1 where all is the same, infinite
     where a value is no number."""
     page = shape[1] * shape[2]
-    first = max(shape[0] // 2 - PAGES // 2, 0) * page
+    count = max(1, min(PAGES, VALUES // page))
+    first = max(shape[0] // 2 - count // 2, 0) * page
     with np.errstate(all="ignore"):
-        pages = flat[first : first + PAGES * page].reshape(-1, *shape[1:]).astype(float)
+        pages = flat[first : first + count * page].reshape(-1, *shape[1:]).astype(float)
         scatter = np.abs(pages - pages.mean()).mean()
         along, across = (np.abs(np.diff(pages, axis=axis)).mean() for axis in (2, 1))
     if not np.isfinite(scatter):
