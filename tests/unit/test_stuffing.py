@@ -100,8 +100,18 @@ def test_two_runs_give_the_same_mesh():
 def test_solid_that_touches_the_border_of_the_image_is_closed_there():
     mesh = stuff(sphere(25.0), 0.0, 2.0)
     assert_sound(mesh)
-    assert mesh.points.min() > -2
-    assert mesh.points.max() < 41
+    assert mesh.points.min() == pytest.approx(-0.5, abs=0.1)
+    assert mesh.points.max() == pytest.approx(39.5, abs=0.1)
+
+
+@pytest.mark.parametrize("slope, offset", [(1e-5, 0), (200, -1000)])
+def test_the_unit_of_the_grey_level_does_not_matter(slope, offset):
+    """Solid that touches the border, and pieces that are dropped, too: attenuations or 16 bits."""
+    pieces = np.maximum(sphere(25.0), np.maximum(rod(2417)[0], rod(2418)[0]) - 50)
+    meshes = [
+        stuff(a * pieces + np.float32(b), b, 2.0) for a, b in ((1, 0), (slope, offset))
+    ]
+    np.testing.assert_allclose(*(mesh.points for mesh in meshes), atol=1e-3)
 
 
 def test_image_without_solid_gives_no_cells():

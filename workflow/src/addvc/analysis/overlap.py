@@ -83,7 +83,8 @@ def level_set(image: np.ndarray, gamma: float) -> tuple[np.ndarray, np.ndarray]:
     """Surface of {image > gamma}, open at the border of the image: points (n, 3), triangles (f, 3)."""
     if not image.min() < gamma < image.max():
         return np.empty((0, 3)), np.empty((0, 3), dtype=int)
-    points, faces = measure.marching_cubes(image, gamma)[:2]
+    height = (image - gamma) / np.ptp(image)  # marching cubes take what is under 1e-7 for nothing
+    points, faces = measure.marching_cubes(height, 0)[:2]
     return points.astype(float), faces
 
 

@@ -18,16 +18,19 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from addvc.fem.mesh import TET_EDGES, Mesh, oriented
+from addvc.geometry.surface import bordered
 from addvc.images.spline import interpolating_coefficients
 
 NEAR_LONG, NEAR_SHORT = 0.24, 0.40  # of the edge: a lattice point is moved onto a nearer cut
 NECK = 0.65  # of the spacing: the least radius of a strut
+BORDER = 2  # voxels around the image, below the threshold as far as its last ones are above it
 
 
 def stuff(grey: np.ndarray, gamma: float, spacing: float, neck: float = NECK) -> Mesh:
     """Tetrahedra of {grey > gamma} for a volume (nx, ny, nz), lattice cubes of side `spacing`.
 
-    The grey level between voxels is the cubic spline through them. A strut thinner than the
+    The grey level between voxels is the cubic spline through them; solid ends with the image, half a
+    voxel beyond the centres of its last voxels. A strut thinner than the
     lattice would fall between its points: along the skeleton of the solid the radius is at least
     `neck` x spacing, which keeps rods of radius 1 whole up to a spacing of 1.2.
     Cells may be in several pieces; their mean volume is about spacing**3 / 14."""
@@ -50,19 +53,18 @@ def stuff(grey: np.ndarray, gamma: float, spacing: float, neck: float = NECK) ->
 
 
 class _Field:
-    """Grey level minus gamma at points (n, 3), at least that of a tube of radius `neck` around the
-    skeleton of the solid; what is outside of the image is below gamma."""
+    """The height above gamma (`surface.bordered`) at points (n, 3), at least that of a tube of radius
+    `neck` around the skeleton of the solid; what is outside of the image is below zero."""
 
     def __init__(self, grey, gamma, neck):
-        self.coefficients = interpolating_coefficients(grey - np.float32(gamma), 3)
-        self.neck, self.slope = neck, float(grey.max() - gamma) / 2
-        thin = neck > 0 and self.slope > 0
-        self.skeleton = cKDTree(skeleton_points(grey > gamma)) if thin else None
+        self.coefficients = interpolating_coefficients(bordered(grey, gamma, BORDER), 3)
+        solid, self.neck = grey > gamma, neck
+        self.skeleton = cKDTree(skeleton_points(solid)) if neck > 0 and solid.any() else None
 
     def __call__(self, points):
         value = ndimage.map_coordinates(
             self.coefficients,
-            points.T,
+            points.T + BORDER,
             order=3,
             prefilter=False,
             output=np.float32,
@@ -70,10 +72,9 @@ class _Field:
             cval=-1.0,
         )
         if self.skeleton is not None:
-            low = np.flatnonzero(value < self.slope * self.neck)
+            low = np.flatnonzero(value < self.neck)
             away, _ = self.skeleton.query(points[low], distance_upper_bound=2 * self.neck)
-            tube = self.slope * (self.neck - np.minimum(away, 2 * self.neck))
-            value[low] = np.maximum(value[low], tube)
+            value[low] = np.maximum(value[low], self.neck - np.minimum(away, 2 * self.neck))
         return np.where(value == 0, np.float32(-1e-6), value)
 
 

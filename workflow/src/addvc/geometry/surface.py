@@ -19,6 +19,7 @@ from addvc.geometry.region import Region, caps_depth
 log = logging.getLogger(__name__)
 
 CLAMP = 0.2
+DEEP = np.float32(0.1)  # of half the height of the solid above gamma
 CAP_SLOPE = 0.5  # of the contrast between solid and threshold, per voxel
 
 
@@ -42,9 +43,11 @@ def capped(grey: np.ndarray, gamma: float, region: Region, contrast: float) -> n
     return out
 
 
-def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]:
-    """`grey` (nx, ny, nz) with all but its largest face-connected solid brought below gamma, a copy, and
-    what was dropped.
+def largest_component(grey: np.ndarray, gamma: float, void: float) -> tuple[np.ndarray, dict]:
+    """`grey` (nx, ny, nz) with all but its largest face-connected solid brought to the grey level `void`,
+    which is below gamma, a copy, and what was dropped.
+
+    Just below gamma, the surface between voxels would still hold crumbs of what was dropped.
 
     Raises GeometryError when there is no solid."""
     label, count = ndimage.label(grey > gamma)
@@ -55,8 +58,7 @@ def largest_component(grey: np.ndarray, gamma: float) -> tuple[np.ndarray, dict]
         )
     size = np.bincount(label.ravel())[1:]
     largest = int(np.argmax(size)) + 1
-    below = min(np.float32(gamma - 1e-3), np.nextafter(np.float32(gamma), np.float32(-np.inf)))
-    kept = np.where((label == 0) | (label == largest), grey, below)
+    kept = np.where((label == 0) | (label == largest), grey, np.float32(void))
     return kept, {
         "components": int(count),
         "kept_fraction": float(size.max() / size.sum()),
@@ -73,7 +75,8 @@ def region_solid(
     Warns when over 10 % of the solid falls out. Raises GeometryError when there is none, or less than
     `min_kept` of it (0..1) stays."""
     gamma, contrast = levels["threshold"], levels["solid"] - levels["void"]
-    grey, figures = largest_component(capped(smooth, gamma, region, contrast), gamma)
+    inside = capped(smooth, gamma, region, contrast)
+    grey, figures = largest_component(inside, gamma, levels["void"])
     kept = figures["kept_fraction"]
     advice = "lower geometry.threshold or porosity, or lower images.blur"
     if kept < min_kept:
@@ -91,11 +94,22 @@ def region_solid(
     return grey, figures
 
 
+def bordered(grey: np.ndarray, gamma: float, width: int) -> np.ndarray:
+    """Grey level (nx, ny, nz) less gamma over half of its most, so that no unit of it matters, with
+    `width` voxels more on each side, as far below as the last ones are above, DEEP at least: float32."""
+    half = float(grey.max() - gamma) / 2
+    height = np.pad((grey - np.float32(gamma)) / np.float32(abs(half) or 1), width, mode="edge")
+    within = np.zeros(height.shape, bool)
+    within[(slice(width, -width),) * 3] = True
+    return np.where(within, height, -np.maximum(np.abs(height), DEEP))
+
+
 def marching_cubes(grey: np.ndarray, gamma: float) -> Surface:
     """The level set `gamma` of grey levels (nx, ny, nz): points (n, 3) in voxels and triangles (f, 3),
-    wound outwards, vertices clamped on edges."""
-    padded = np.pad(grey, 1, constant_values=gamma - 1)
-    points, faces, _, _ = measure.marching_cubes(padded, gamma, gradient_direction="descent")
+    wound outwards, vertices clamped on edges. Solid ends with the image, half a voxel beyond the
+    centres of its last voxels."""
+    height = bordered(grey, gamma, 1)
+    points, faces, _, _ = measure.marching_cubes(height, 0, gradient_direction="descent")
     base = np.floor(points)
     fraction = points - base
     moving = fraction > 1e-6
