@@ -108,9 +108,7 @@ def test_solid_that_touches_the_border_of_the_image_is_closed_there():
 def test_the_unit_of_the_grey_level_does_not_matter(slope, offset):
     """Solid that touches the border, and pieces that are dropped, too: attenuations or 16 bits."""
     pieces = np.maximum(sphere(25.0), np.maximum(rod(2417)[0], rod(2418)[0]) - 50)
-    meshes = [
-        stuff(a * pieces + np.float32(b), b, 2.0) for a, b in ((1, 0), (slope, offset))
-    ]
+    meshes = [stuff(a * pieces + np.float32(b), b, 2.0) for a, b in ((1, 0), (slope, offset))]
     np.testing.assert_allclose(*(mesh.points for mesh in meshes), atol=1e-3)
 
 

@@ -7,11 +7,14 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from addvc.correlation.corotational import BRIDGE as SOFTER
 from addvc.correlation.corotational import corotational
+from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.mending import Mending
-from addvc.correlation.micro import elastic, micro_options, micro_reference
+from addvc.correlation.micro import elastic, micro_options, micro_reference, system_at_rest
 from addvc.correlation.register import Stop
 from addvc.correlation.stages import Problem, Stage, stage_system
+from addvc.correlation.store import save_factor, save_solution
 from addvc.correlation.torn import SOFT, apart, joints_of, torn_joints
 from addvc.fem.mesh import cell_volumes
 from addvc.fem.operators import corotational_load, stiffness
@@ -95,6 +98,24 @@ def test_a_bridge_is_softer_than_the_other_struts_and_a_cut_softer_still(bridged
     ]
     share = cell_volumes(mesh)[joint.around].sum() / cell_volumes(mesh).sum()
     assert energy[1] / energy[0] == pytest.approx(1 - share / 2)
+
+
+def test_the_noise_of_a_state_is_that_of_its_last_stage(bridged, tmp_path):
+    """Bridges soft, and torn where the state has torn them; as stiff as the rest before any state."""
+    (joint,), factor, solved = bridged.joints, tmp_path / "factor.h5", tmp_path / "state1.h5"
+    soft, rest = replace(bridged, bridge=SOFTER), Stage(rotated=False)
+    system, u = stage_system(bridged, rest, None), 0 * bridged.reference.mesh.points
+    notes = {"c": bridged.weight, "l_e": bridged.cutoff}
+    save_factor(factor, system.factor, system.regularisation.tocsr(), notes)
+    given = bridged.reference, "corotational", bridged.nu, factor
+    for last, torn in ((soft, []), (soft.tear([joint]), [BRIDGE["thinnest"]])):
+        save_solution(solved, Solution(u, [0.0], True, 0.0, {}), torn=torn, **notes)
+        found = system_at_rest(*given, solved, [BRIDGE])
+        known = stage_system(last, rest, None)
+        assert abs(found.regularisation - known.regularisation).max() == 0
+        assert_array_equal(found.reference.quadrature.weight, known.reference.quadrature.weight)
+    before = system_at_rest(*given, None, [BRIDGE]).regularisation
+    assert abs(before - system.regularisation).max() == 0
 
 
 def test_a_cut_goes_across_one_strut_and_nothing_else(bridged):

@@ -324,6 +324,7 @@ rule noise_draws:
         factor=f"{R}/dvc/{MICRO[0]}_factor.h5",
         threshold=f"{R}/geometry/threshold.json",
         solution=f"{R}/dvc/{MICRO[0]}_state{{state}}.h5",
+        bridges=f"{R}/geometry/bridges.json",
     output:
         f"{R}/dvc/{MICRO[0]}_noise_state{{state}}.h5",
     log:

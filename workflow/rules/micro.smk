@@ -186,6 +186,7 @@ rule micro_ultimate_error:
         reference=f"{R}/volumes/smooth0.h5",
         threshold=f"{R}/geometry/threshold.json",
         factor=f"{R}/dvc/{{micro}}_factor.h5",
+        bridges=f"{R}/geometry/bridges.json",
     output:
         f"{R}/analysis/ultimate_{{micro}}.json",
     log:

@@ -14,7 +14,7 @@ with job(snakemake):
     coefficients, degree = load_coefficients(source.reference)
     shell = shell_of(params.method, load_quadrature(source.shell))
     reference = micro_reference(read_mesh(source.mesh), coefficients, shell, degree)
-    given = source.factor, source.get("solution")
+    given = source.factor, source.get("solution"), read_json(source.bridges)
     system = system_at_rest(reference, params.method, params.nu, *given)
     noise = Noise(read_json(source.threshold)["noise"], params.images["blur"])
     shifts = params.ultimate_error["shifts"]

@@ -5,13 +5,14 @@
 in a frame that turns with the struts (`correlation.corotational`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 
 from addvc.config import METHODS, chooses
+from addvc.correlation.corotational import BRIDGE
 from addvc.correlation.cutoff import Ladder
 from addvc.correlation.doubt import residual_limit
 from addvc.correlation.mending import Mending
@@ -111,16 +112,24 @@ def problem_of(
 
 
 def system_at_rest(
-    reference: Reference, method: str, nu: float, factor: str | Path, solution: str | Path | None
+    reference: Reference,
+    method: str,
+    nu: float,
+    factor: str | Path,
+    solution: str | Path | None,
+    bridges: list[dict],
 ) -> System:
-    """The system of a method before any turning, from what `factor` holds; with the weight of the
-    elastic energy that `solution` was found with, where there is one."""
+    """The system of a method before any turning, from what `factor` holds and the rows of bridges.json;
+    with the weight of the elastic energy, and the bridges cut, that `solution` ended with, if any."""
     if METHODS[method].gap:
         known, extra, _ = load_factor(factor)
         return System(reference, extra, known)
-    order, weights = load_order(factor)
-    c = (weights if solution is None else load_notes(solution))["c"]
-    problem = Problem(reference, c, nu, order=order)
+    order, notes = load_order(factor)
+    problem = problem_of(reference, notes, nu, order, bridges)
+    if solution is not None:
+        notes = load_notes(solution)
+        cuts = [joint for joint in problem.joints if joint.position in notes["torn"]]
+        problem = replace(problem, weight=notes["c"], bridge=BRIDGE).tear(cuts)
     return stage_system(problem, Stage(rotated=False), None)
 
 
