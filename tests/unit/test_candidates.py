@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from addvc.correlation import meso
-from addvc.correlation.candidates import candidate
+from addvc.correlation.candidates import candidate, shortening
 from addvc.correlation.clear import clear_voxels
 from addvc.correlation.cutoff import Ladder
 from addvc.correlation.gauss_newton import Solution, rms
@@ -84,6 +84,15 @@ def test_extrapolation_without_platens_says_what_to_do(source, points, speckle):
     save_volume(source["deformed"], speckle((24, 40, 24)))
     with pytest.raises(CorrelationError, match="leave `extrapolated` out of meso"):
         candidate("extrapolated", source, AXIS)
+
+
+def test_one_platen_that_moves_is_no_compression(rng):
+    """Both images show the lower one only; the end of the image is no face."""
+    volumes = [rng.normal(20, 2, (40, 60, 40)).astype(np.float32) for _ in range(2)]
+    for volume, face in zip(volumes, (8, 11), strict=True):
+        volume[:, :face] = 150
+    with pytest.raises(CorrelationError, match="do not both show both platens along axis 1"):
+        shortening(*volumes, AXIS)
 
 
 # ------------------------------------------------------------------------------- the choice

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth, save_mesh_truth
-from addvc.analysis.truth import errors_at, load_truth
+from addvc.analysis.truth import check_truth, errors_at, load_truth
 from addvc.errors import ConfigError, MeshError
 from addvc.fem.elements import P2_EDGES, tet_p1, tet_p2
 from addvc.fem.mesh import Mesh
@@ -162,6 +162,39 @@ def test_meshes_that_cannot_be_interpolated_in_are_refused(block):
     bent[cells[0, 4]] += [0.2, 0, 0]
     with pytest.raises(MeshError, match=r"0\.2 voxel off the middle \(at most 0\.001\); give"):
         MeshTruth(bent, cells, u)
+
+
+def test_numbers_that_are_none_and_nodes_that_are_not_there_are_refused(block):
+    points, cells, u = block._points, block._cells, block._u
+    with pytest.raises(
+        MeshError, match=rf"nodes 1 to {len(points)}, its points are 0 to .* from 0"
+    ):
+        MeshTruth(points, cells + 1, u)
+    gaps = u[0].copy()
+    gaps[[3, 5], 1] = np.nan
+    with pytest.raises(
+        MeshError, match=rf"2 of the {len(points)} vectors of displacement1 .* finite"
+    ):
+        MeshTruth(points, cells, [gaps])
+
+
+def test_a_truth_that_lies_elsewhere_is_refused(block, rng, caplog):
+    """Millimetres, or a crop that was forgotten; a strut that it lacks only makes a warning."""
+    x = rng.uniform([2, 2, 2], [8, 10, 8], (100, 3))
+    with pytest.raises(
+        MeshError, match=r"100% of the nodes .* over 2 voxels outside .* scans.crop"
+    ):
+        errors_at(block, x + 20, [0 * x], 1)
+    errors_at(block, np.where(np.arange(100)[:, None] < 10, x + 20, x), [0 * x], 1)
+    assert "10 % of the nodes are over 2 voxels outside" in caplog.text
+
+
+def test_a_truth_is_checked_before_any_work(block, tmp_path):
+    path = tmp_path / "truth.h5"
+    save_mesh_truth(path, block._points, block._cells, block._u)
+    check_truth(path, 1)
+    with pytest.raises(ConfigError, match=r"truth.h5 has 1 states \(at least 2, those of scans"):
+        check_truth(path, 2)
 
 
 def test_orientation_of_the_cells_does_not_matter(cross, rng):

@@ -332,6 +332,18 @@ def test_a_raw_scan_with_its_sizes_in_another_order_is_told_by_its_looks(blobs):
     expect(r"with \[14, 20, 26\] by .*in the order of axes, 'zyx'", blobs("uint16"), wrong)
 
 
+def test_missing_values_of_a_raw_scan_are_not_put_down_to_its_byte_order(blobs):
+    """Whole numbers of single precision are finite in either order."""
+    path, right = (
+        blobs("float32"),
+        ScanFormat(shape=(14, 20, 26), dtype="float32", byte_order="big"),
+    )
+    grey = np.rint(np.fromfile(path, ">f4")).reshape(right.shape)
+    grey[:, 3] = np.nan
+    grey.astype(">f4").tofile(path)
+    assert open_scan(path, right).shape == (26, 20, 14)
+
+
 def test_a_type_with_its_byte_order_is_refused(blobs):
     both = ScanFormat(shape=(14, 20, 26), dtype=">u2")
     expect("say dtype: uint16 and byte_order: big", blobs("uint16"), both)

@@ -96,6 +96,9 @@ def test_a_voxel_size_that_the_header_contradicts_is_warned_of(tmp_path, pages):
     assert "WARNING" not in check_headers(right)
     right["scans"]["voxel_size_um"] = 1.8
     assert "the header has a voxel size of 0.018" in check_headers(right)
+    image.SetSpacing((0.0018, 0.0018, 0.01))
+    sitk.WriteImage(image, tmp_path / "a.mha")
+    assert "voxels of 0.0018 x 0.0018 x 0.01, which are no cubes" in check_headers(right)
 
 
 def test_a_cell_larger_than_half_of_the_image_is_refused(tmp_path, pages):

@@ -400,6 +400,13 @@ def test_no_struts_are_a_table_too(tmp_path):
     assert judged(back, true, {"micro": ""})["micro"]["field"]["struts"] == 0
 
 
+def test_one_neighbour_is_a_text_as_several_are(tmp_path):
+    write_columns(tmp_path / "table.csv", {"neighbours": ["1", "0"], "length": [2.5, 3.0]})
+    back = read_columns(tmp_path / "table.csv")
+    assert back["neighbours"].tolist() == ["1", "0"]
+    assert back["length"].tolist() == [2.5, 3.0]
+
+
 def test_a_stub_is_no_strut_and_leaves_one_strut_behind():
     line = np.column_stack([np.arange(21.0), np.zeros(21), np.zeros(21)])
     stub = Branch(np.array([[10.0, 0, 0], [10, 1, 0], [10, 2, 0]]), (2, FREE_END))

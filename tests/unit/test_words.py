@@ -12,7 +12,7 @@ import pytest
 from matplotlib.image import imread, imsave
 from snakemake.utils import validate
 
-from addvc.errors import AddvcError
+from addvc.errors import AddvcError, grey_words
 from addvc.report.doubts import strain_warnings
 from addvc.report.page_tables import results_table
 from addvc.report.thumbnail import thumbnail
@@ -460,3 +460,15 @@ def test_strict_makes_a_failed_state_an_error():
 def test_only_strict_and_only_a_failed_state():
     check_verdicts(summary(GOOD, LOST), strict=False)
     check_verdicts(summary(GOOD, DOUBTFUL, ENDLESS), strict=True)
+
+
+@pytest.mark.parametrize(
+    "value, words",
+    [(16000.44, "16000.4"), (-12.0, "-12.0"), (1.5, "1.50"), (1.27e-5, "1.27e-05"), (0.0, "0")],
+)
+def test_grey_levels_of_any_unit_are_told(value, words):
+    assert grey_words(value) == words
+
+
+def test_an_unknown_grey_level_is_told_as_such():
+    assert grey_words(None) == "unknown"

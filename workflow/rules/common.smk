@@ -25,7 +25,12 @@ def images_words(config):
     if "scans" in config:
         from addvc.images.scans_check import check_headers  # slow to load
 
-        return check_headers(config)
+        words = check_headers(config)
+        if truth := settings.truth_file(config):
+            from addvc.analysis.truth import check_truth
+
+            check_truth(truth, len(settings.state_labels(config)))
+        return words
     twin, states = config["twin"], len(settings.state_labels(config))
     return f"a synthetic test, {twin['size']}, seed {twin['seed']}, of {states} states"
 

@@ -45,3 +45,12 @@ def refuse(faults: Iterable[str], kind: type[AddvcError], what: str = "") -> Non
     if different:
         lines = "".join(f"\n- {fault}" for fault in different)
         raise kind(f"{len(different)} things are wrong{what}:{lines}")
+
+
+def grey_words(value: float | None) -> str:
+    """A grey level in words: to a tenth, to a hundredth below 10, with three digits where it is small, as
+    an attenuation is; "unknown" for None."""
+    if value is None:
+        return "unknown"
+    size = abs(value)
+    return f"{value:.1f}" if size >= 10 else f"{value:.2f}" if size >= 0.1 else f"{value:.3g}"

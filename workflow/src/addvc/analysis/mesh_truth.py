@@ -59,7 +59,8 @@ class MeshTruth:
         """From a file of `save_mesh_truth`, or of the user's making.
 
         Raises ConfigError where points, cells or one of displacement1, 2, ... is missing, MeshError
-        where the shapes of these do not fit or a side of a quadratic tetrahedron is not straight."""
+        where the shapes of these do not fit, a vector is not finite, a cell has a node that there is
+        not, or a side of a quadratic tetrahedron is not straight."""
         with h5py.File(path) as file:
             count = sum(re.fullmatch(r"displacement\d+", name) is not None for name in file)
             wanted = {f"displacement{n}" for n in range(1, max(count, 1) + 1)}
@@ -104,6 +105,11 @@ class MeshTruth:
         return self._struts[0][cell], self._axes[0][cell], np.where(inside, -away, away)
 
     @property
+    def states(self) -> int:
+        """How many loading states it has."""
+        return len(self._u)
+
+    @property
     def junctions(self) -> np.ndarray:
         """(j, 3) where struts meet in the reference."""
         return self._struts[1]
@@ -139,22 +145,46 @@ def is_mesh_truth(path: str | os.PathLike) -> bool:
 
 def _check(points: np.ndarray, cells: np.ndarray, displacements: list[np.ndarray]) -> None:
     """MeshError for what cannot be interpolated in."""
-    if cells.ndim != 2 or cells.shape[1] not in (4, 10):
-        raise MeshError(f"the truth has cells of shape {cells.shape}; (m, 4) or (m, 10) is needed")
-    for state, u in enumerate(displacements, start=1):
-        if u.shape != points.shape:
+    _check_shapes(points, cells, displacements)
+    if cells.min() < 0 or cells.max() >= len(points):
+        raise MeshError(
+            f"the cells of the truth have nodes {cells.min()} to {cells.max()}, its points are 0 to "
+            f"{len(points) - 1}; count nodes from 0"
+        )
+    for name, values in {"points": points, **_named(displacements)}.items():
+        bad = int((~np.isfinite(values).all(axis=1)).sum())
+        if bad:
             raise MeshError(
-                f"displacement{state} of the truth has shape {u.shape}, its points {points.shape}; "
-                "give one vector a node"
+                f"{bad} of the {len(values)} vectors of {name} of the truth are not finite; give all "
+                "nodes numbers, or leave out cells whose motion is not known"
             )
     if cells.shape[1] == 10:
-        middle = points[cells[:, P2_EDGES]].mean(axis=2)
-        off = float(np.linalg.norm(points[cells[:, 4:]] - middle, axis=2).max())
-        if off > STRAIGHT:
+        _check_straight(points, cells)
+
+
+def _named(displacements: list[np.ndarray]) -> dict[str, np.ndarray]:
+    return {f"displacement{state}": u for state, u in enumerate(displacements, start=1)}
+
+
+def _check_shapes(points: np.ndarray, cells: np.ndarray, displacements: list[np.ndarray]) -> None:
+    if cells.ndim != 2 or cells.shape[1] not in (4, 10):
+        raise MeshError(f"the truth has cells of shape {cells.shape}; (m, 4) or (m, 10) is needed")
+    for name, u in _named(displacements).items():
+        if u.shape != points.shape:
             raise MeshError(
-                f"a node of an edge is {off:.2g} voxel off the middle (at most {STRAIGHT}); give "
-                "quadratic tetrahedra with straight sides, nodes in VTK's order"
+                f"{name} of the truth has shape {u.shape}, its points {points.shape}; give one vector a "
+                "node"
             )
+
+
+def _check_straight(points: np.ndarray, cells: np.ndarray) -> None:
+    middle = points[cells[:, P2_EDGES]].mean(axis=2)
+    off = float(np.linalg.norm(points[cells[:, 4:]] - middle, axis=2).max())
+    if off > STRAIGHT:
+        raise MeshError(
+            f"a node of an edge is {off:.2g} voxel off the middle (at most {STRAIGHT}); give "
+            "quadratic tetrahedra with straight sides, nodes in VTK's order"
+        )
 
 
 def local_axes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -229,8 +259,8 @@ def save_mesh_truth(
     _check(points, cells, displacements)
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         file["points"], file["cells"] = points, cells
-        for state, u in enumerate(displacements, start=1):
-            file[f"displacement{state}"] = u
+        for name, u in _named(displacements).items():
+            file[name] = u
         for name, value in (("strains", strains), ("platens", platens)):
             if value is not None:
                 file.attrs[name] = value

@@ -11,6 +11,9 @@ from addvc.analysis.struts import Strut
 from addvc.fem.mesh import Mesh
 from addvc.images.files import atomic_path
 
+WORDS = ("neighbours", "flag", "dominance")
+"""How columns begin whose entries are no numbers, though one neighbour looks like one."""
+
 RAGGED = ("nodes", "weight", "place")
 """Arrays whose length differs from strut to strut, kept end to end."""
 
@@ -69,14 +72,10 @@ def _text(value) -> str:
 
 
 def read_columns(path: str | Path) -> dict[str, np.ndarray]:
-    """Columns of a file of `write_columns`, as numbers where all are."""
+    """Columns of a file of `write_columns`, as numbers but for WORDS."""
     with Path(path).open(newline="", encoding="utf-8") as file:
         header, *rows = list(csv.reader(file))
-    return {name: _numbers([row[n] for row in rows]) for n, name in enumerate(header)}
-
-
-def _numbers(texts: list[str]) -> np.ndarray:
-    try:
-        return np.array(texts, dtype=float)
-    except ValueError:
-        return np.array(texts)
+    return {
+        name: np.array([row[n] for row in rows], dtype=str if name.startswith(WORDS) else float)
+        for n, name in enumerate(header)
+    }

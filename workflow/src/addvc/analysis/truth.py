@@ -1,13 +1,20 @@
 """Errors against a known truth: for judging only. Nothing that measures may import this module."""
 
+import logging
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth
+from addvc.errors import ConfigError, MeshError
 from addvc.twin.truth import Truth
 from addvc.twin.virtual import VirtualField
+
+log = logging.getLogger(__name__)
+
+AWAY, FEW = 2.0, 0.05
+"""Voxels that a truth can be extrapolated by; the share of nodes that may be farther."""
 
 Judge = Truth | MeshTruth | VirtualField
 
@@ -17,6 +24,34 @@ def load_truth(path: str | Path) -> Judge:
     if Path(path).suffix == ".json":
         return VirtualField.load(path)
     return MeshTruth.load(path) if is_mesh_truth(path) else Truth.load(str(path))
+
+
+def check_truth(path: str | Path, states: int) -> None:
+    """Before any work: ConfigError or MeshError where a truth cannot be read, or has not as many states
+    as there are to judge."""
+    truth = load_truth(path)
+    if truth.states < states:
+        raise ConfigError(
+            f"truth {path} has {truth.states} states (at least {states}, those of scans.states); add "
+            "their displacements, or leave out `truth`"
+        )
+
+
+def check_near(distance: np.ndarray) -> None:
+    """MeshError where over half of the nodes are over AWAY voxels outside of the solid of the truth, by
+    their `distance` (n,) to its surface; a warning where it is over FEW of them."""
+    far = float(np.mean(distance > AWAY))
+    if far > 0.5:
+        raise MeshError(
+            f"{far:.0%} of the nodes of the micro mesh are over {AWAY:g} voxels outside of the solid of "
+            "the truth (at most half): its points are in voxels of the binned and cropped reference, "
+            "x y z; check their unit, scans.crop and scans.bin"
+        )
+    if far > FEW:
+        log.warning(
+            "WARNING: %.0f %% of the nodes are over %g voxels outside of the solid of the truth, "
+            "where it is extrapolated: errors there mean little", 100 * far, AWAY,
+        )  # fmt: skip
 
 
 def judged_nodes(cells: np.ndarray, penalised: np.ndarray, torn: Sequence[int]) -> np.ndarray:
@@ -35,7 +70,11 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     """Lengths of error vectors (n, 3) in voxels: rms, median, 95th percentile, share below 1.
 
     With the tangents (n, 3) of the struts also the rms normal to and along the strut: a slip along
-    a uniform strut cannot be seen in an image."""
+    a uniform strut cannot be seen in an image. MeshError where there is no node."""
+    if len(error) == 0:
+        raise MeshError(
+            "no node of the micro mesh can be judged: all are at its ends; widen micro.region"
+        )
     length = np.linalg.norm(error, axis=1)
     result = {
         "count": len(error),
@@ -57,7 +96,11 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
 def errors_at(
     truth: Judge, points: np.ndarray, fields: Iterable[np.ndarray], state: int
 ) -> list[dict]:
-    """Error statistics of each u (n, 3) of `fields`, measured at points (n, 3) of the reference."""
-    tangent = None if isinstance(truth, VirtualField) else truth.strut(points)[1]
+    """Error statistics of each u (n, 3) of `fields`, measured at points (n, 3) of the reference. Raises
+    MeshError where the truth is not there."""
+    tangent = None
+    if not isinstance(truth, VirtualField):
+        _, tangent, distance = truth.strut(points)
+        check_near(distance)
     true = truth.displacement(points, state)
     return [error_statistics(u - true, tangent) for u in fields]

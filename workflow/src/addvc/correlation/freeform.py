@@ -125,7 +125,8 @@ def affine_start(
     grid: SplineGrid, reference: np.ndarray, deformed: np.ndarray, axis: int
 ) -> np.ndarray:
     """Coefficients (nx, ny, nz, 3) of the compression between the platens seen in both images, rigid
-    beyond their faces; zero where these do not show the same platens."""
+    beyond their faces; an end of the images where neither shows a platen is held; zero where they do
+    not show the same platens."""
     points = grid.control_points()
     u = np.zeros_like(points)
     faces = moved_faces(reference, deformed, axis)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import ndimage
 from skimage import measure
 
-from addvc.errors import GeometryError
+from addvc.errors import GeometryError, grey_words
 from addvc.geometry.region import Region, caps_depth
 
 log = logging.getLogger(__name__)
@@ -44,8 +44,8 @@ def capped(grey: np.ndarray, gamma: float, region: Region, contrast: float) -> n
 
 
 def largest_component(grey: np.ndarray, gamma: float, void: float) -> tuple[np.ndarray, dict]:
-    """`grey` (nx, ny, nz) with all but its largest face-connected solid brought to the grey level `void`,
-    which is below gamma, a copy, and what was dropped.
+    """A copy of `grey` (nx, ny, nz) with all but its largest face-connected solid brought to the grey
+    level `void`, which is below gamma, and what was dropped.
 
     Just below gamma, the surface between voxels would still hold crumbs of what was dropped.
 
@@ -53,7 +53,7 @@ def largest_component(grey: np.ndarray, gamma: float, void: float) -> tuple[np.n
     label, count = ndimage.label(grey > gamma)
     if count == 0:
         raise GeometryError(
-            f"no voxel of the region is above the threshold {gamma:.1f}; widen "
+            f"no voxel of the region is above the threshold {grey_words(gamma)}; widen "
             "micro.region, or lower the threshold"
         )
     size = np.bincount(label.ravel())[1:]

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
-from addvc.errors import GeometryError
+from addvc.errors import GeometryError, grey_words
 from addvc.images.specimen import Specimen
 from addvc.images.spline import DEGREE, spline_value
 
@@ -58,18 +58,19 @@ def check_contrast(grey: np.ndarray, gamma: float) -> dict:
     void, solid = grey[grey < gamma], grey[grey >= gamma]
     if len(void) == 0 or len(solid) == 0:
         raise GeometryError(
-            f"the threshold {gamma:.1f} leaves no {'solid' if len(void) else 'void'}: "
-            f"grey levels of the specimen go from {grey.min():.1f} to "
-            f"{grey.max():.1f}; change geometry.threshold"
+            f"the threshold {grey_words(gamma)} leaves no {'solid' if len(void) else 'void'}: "
+            f"grey levels of the specimen go from {grey_words(grey.min())} to "
+            f"{grey_words(grey.max())}; change geometry.threshold"
         )
     level = float(np.median(void))
     noise = robust_deviation(void)
     if gamma < level + 2 * noise:
         raise GeometryError(
-            f"the threshold {gamma:.1f} is within 2 standard deviations of the void "
-            f"({level:.1f}, noise {noise:.1f}): it makes {np.mean(grey >= gamma):.0%} of the specimen "
-            "solid, void included; raise porosity, or give geometry.threshold; if struts are darker "
-            "than the void, invert the scans; if the platens were taken for the specimen, correct "
+            f"the threshold {grey_words(gamma)} is within 2 standard deviations of the void "
+            f"({grey_words(level)}, noise {grey_words(noise)}): it makes "
+            f"{np.mean(grey >= gamma):.0%} of the specimen solid, void included; raise porosity, or "
+            "give geometry.threshold; if struts are darker than the void, invert the scans; if the "
+            "platens were taken for the specimen, correct "
             "loading_axis or scans.axes"
         )
     return {"void": level, "solid": float(np.median(solid)), "noise": noise}

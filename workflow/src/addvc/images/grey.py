@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import median_abs_deviation, trim_mean
 from skimage.filters import threshold_isodata
 
-from addvc.errors import ScanError
+from addvc.errors import ScanError, grey_words
 from addvc.images.platens import find_platens
 
 log = logging.getLogger(__name__)
@@ -65,7 +65,8 @@ def grey_levels(volume: np.ndarray, axis: int) -> Levels:
     if middle < void + CLEAR * noise:
         raise ScanError(
             f"void and solid of a scan cannot be told apart: the threshold between them, {middle:.1f}, "
-            f"is within {CLEAR:g} deviations of the void ({void:.1f}, noise {noise:.1f}); raise "
+            f"is within {CLEAR:g} deviations of the void ({grey_words(void)}, noise "
+            f"{grey_words(noise)}); raise "
             "scans.bin, or use images.grey: none"
         )
     return Levels(float(void), float(trim_mean(grey[grey > middle], MIDDLE)), float(noise))
@@ -110,7 +111,7 @@ def matched(volume: np.ndarray, levels: Levels, wanted: Levels) -> np.ndarray:
             f"{1 / LEAST:g} can be matched): check that both are scans of the same specimen"
         )
     log.info(
-        "grey levels: void %.1f, solid %.1f, contrast x %.3f", levels.void, levels.solid, ratio
+        "grey levels: void %.4g, solid %.4g, contrast x %.3f", levels.void, levels.solid, ratio
     )
     return (
         (volume - np.float32(levels.void)) / np.float32(ratio) + np.float32(wanted.void)

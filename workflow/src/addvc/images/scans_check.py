@@ -13,6 +13,7 @@ from addvc.images.scans import Crop, Scan, ScanFormat, binned_shape, open_scan
 FINGERPRINT_BYTES = 2**20
 WHAT = " with the scans"
 UNITS_UM = (1, 1e3, 1e6)  # micrometres, millimetres, metres
+ALIKE = 0.02  # what two voxel sizes that are meant to be one may differ by
 
 
 class Checked(NamedTuple):
@@ -81,13 +82,22 @@ def check_cell(cell_size: str | float | None, shape: tuple[int, ...]) -> None:
         )
 
 
-def spacing_words(spacing: float | None, voxel_um: float) -> str:
-    """A warning where the header of a scan has another voxel size, whatever its unit."""
-    if spacing is None or any(abs(spacing * unit / voxel_um - 1) < 0.02 for unit in UNITS_UM):
+def spacing_words(spacing: Sequence[float] | None, voxel_um: float) -> str:
+    """A warning where the header of a scan has voxels that are no cubes, or another voxel size, whatever
+    its unit."""
+    if spacing is None:
+        return ""
+    if max(spacing) > (1 + ALIKE) * min(spacing):
+        edges = " x ".join(f"{edge:g}" for edge in spacing)
+        return (
+            f" (WARNING: the header has voxels of {edges}, which are no cubes: lengths and strains will "
+            "be wrong unless the header is; resample the scans to cubic voxels)"
+        )
+    if any(abs(spacing[0] * unit / voxel_um - 1) < ALIKE for unit in UNITS_UM):
         return ""
     return (
-        f" (WARNING: the header has a voxel size of {spacing:g}, which in no unit is the {voxel_um:g} "
-        "micrometres of scans.voxel_size_um)"
+        f" (WARNING: the header has a voxel size of {spacing[0]:g}, which in no unit is the "
+        f"{voxel_um:g} micrometres of scans.voxel_size_um)"
     )
 
 

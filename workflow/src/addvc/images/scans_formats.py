@@ -40,14 +40,14 @@ class Source:
     """An opened scan in the file's own axis order.
 
     read(start, stop) -> slices along the first axis, (stop - start, ...); files: what holds them;
-    spacing: edge of a voxel as the header has it, in its own unit, None where it says nothing.
+    spacing: edges of a voxel as the header has them, in its own unit, None where it says nothing.
     """
 
     shape: tuple[int, ...]
     dtype: np.dtype
     read: Callable[[int, int], NDArray]
     files: tuple[Path, ...]
-    spacing: float | None = None
+    spacing: tuple[float, ...] | None = None
 
 
 def is_pattern(path: Path) -> bool:

@@ -46,9 +46,9 @@ def open_itk(path: Path, fmt: ScanFormat) -> Source:
     else:
         read = _reader_of_parts(path, size)
         read(size[-1] - 1, size[-1])  # the end of a truncated file is missing
-    edge = reader.GetSpacing()[0]
+    edges = tuple(reader.GetSpacing())
     files = tuple(dict.fromkeys((data, path)))
-    return Source(tuple(size[::-1]), dtype, read, files, None if edge == 1 else edge)
+    return Source(tuple(size[::-1]), dtype, read, files, None if set(edges) == {1} else edges)
 
 
 def _dtype(reader: "sitk.ImageFileReader") -> np.dtype:

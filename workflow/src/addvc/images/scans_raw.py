@@ -111,15 +111,19 @@ def _check_raw_look(path: Path, fmt: ScanFormat, shape: tuple[int, ...], dtype: 
 
 def unlike(flat: NDArray, shape: Sequence[int]) -> tuple[float, float]:
     """How unlike neighbours are along rows and across them, in some pages of the middle of an array:
-    mean absolute differences over the mean absolute deviation of all; 1 where all is the same, infinite
-    where a value is no number."""
+    mean absolute differences over the mean absolute deviation of all that are numbers; 1 where all is
+    the same, infinite where over half are none."""
     page = shape[1] * shape[2]
     count = max(1, min(PAGES, VALUES // page))
     first = max(shape[0] // 2 - count // 2, 0) * page
     with np.errstate(all="ignore"):
         pages = flat[first : first + count * page].reshape(-1, *shape[1:]).astype(float)
-        scatter = np.abs(pages - pages.mean()).mean()
-        along, across = (np.abs(np.diff(pages, axis=axis)).mean() for axis in (2, 1))
+        known = np.isfinite(pages)
+        if known.mean() < 0.5:
+            return np.inf, np.inf
+        pages[~known] = np.nan
+        scatter = np.nanmean(np.abs(pages - np.nanmean(pages)))
+        along, across = (np.nanmean(np.abs(np.diff(pages, axis=axis))) for axis in (2, 1))
     if not np.isfinite(scatter):
         return np.inf, np.inf
     return (float(along / scatter), float(across / scatter)) if scatter > 0 else (1.0, 1.0)

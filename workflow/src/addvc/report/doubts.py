@@ -1,6 +1,7 @@
 """What to distrust in a result: the section of the first page that is never silently empty."""
 
 from addvc.analysis.balance import refusal
+from addvc.errors import grey_words
 from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name
 
@@ -198,9 +199,10 @@ def residual_warnings(state: dict, micro: str) -> list[str]:
     ):
         return []
     return [
-        f"- State {state['state']}, {micro}: the residual has a standard deviation of {sigma:.2f} grey "
-        f"levels, {sigma / alone:.1f} times that of noise alone (at most {NOISE_TIMES:g}): some struts "
-        "are not where they were put, or the contrast of the scans differs. Look at Fig. 13 for where, "
+        f"- State {state['state']}, {micro}: the residual has a standard deviation of "
+        f"{grey_words(sigma)} grey levels, {sigma / alone:.1f} times that of noise alone (at most "
+        f"{NOISE_TIMES:g}): some struts are not where they were put, or the contrast of the "
+        "scans differs. Look at Fig. 13 for where, "
         "leave out what is not `valid`; raise micro.mending, or say images.grey: global."
     ]
 
@@ -212,7 +214,8 @@ def noise_warnings(state: dict, micro: str) -> list[str]:
         why = f"its l_E is {state[micro]['l_e']:.2g} voxels, the shortest that may be chosen"
     elif sigma is not None and alone is not None and sigma < alone / NOISE_OVER:
         why = (
-            f"its residual, {sigma:.2f} grey levels, is far below that of noise alone, {alone:.2f}"
+            f"its residual, {grey_words(sigma)} grey levels, is far below that of noise alone, "
+            f"{grey_words(alone)}"
         )
     else:
         return []

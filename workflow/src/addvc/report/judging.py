@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from addvc.errors import grey_words
 from addvc.report.case import Case
 from addvc.report.tables import write_tables
 
@@ -14,7 +15,7 @@ def difficulty(case: Case, outputs: Iterable[str]) -> None:
     names = {"rest": "u = 0", "truth": "the truth"}
     for key in first["sigma"]:
         name = names.get(key, f"the best field of {key}")
-        values = (f"{s['sigma'][key]:.2f}" for s in states)
+        values = (grey_words(s["sigma"][key]) for s in states)
         rows.append([f"σ(r) under {name}", "grey level", *values])
     for key in first["beyond"]:
         name = "an affine field" if key == "affine" else f"the best field of {key}"

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from addvc.errors import grey_words
 from addvc.fem.mesh import Mesh, outer_faces
 from addvc.report import style
 from addvc.report.case import Case
@@ -27,7 +28,7 @@ def deformed(case: Case, outputs: Iterable[str]) -> None:
             layer = Layer(mesh.points + solution.u, faces, colour, edges=True, line_width=1.5)
             render([layer], view, 170 / columns, fit).show(ax)
             style.headline(ax, case.title(state, name), row * columns + column)
-            sigma = f"σ(r) = {solution.residual['std']:.2f} grey levels"
+            sigma = f"σ(r) = {grey_words(solution.residual['std'])} grey levels"
             style.note(ax, sigma, fontsize=8)
         style.row_name(axes[row, 0], name)
     style.scale_bar(axes[-1, 0], case.voxel_um, 0.4, y=-0.2)

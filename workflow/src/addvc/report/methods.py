@@ -1,7 +1,10 @@
 """Methods to paste into a paper, with references, from the configuration and the numbers."""
 
+from collections.abc import Callable
+
 from addvc.config import METHODS, chooses, loading_axis, micro_names
 from addvc.correlation.micro import MicroOptions, micro_options, turns
+from addvc.errors import grey_words
 from addvc.report import style
 from addvc.report.references import Citations
 
@@ -41,9 +44,12 @@ def listing(words: list[str], last: str = "and") -> str:
     return f" {last} ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
-def span(values: list[float], form: str) -> str:
+def span(values: list[float], form: str | Callable[[float], str]) -> str:
     """From the least to the greatest of the values, or the one that there is."""
-    low, high = (format(value, form) for value in (min(values), max(values)))
+    low, high = (
+        form(value) if callable(form) else format(value, form)
+        for value in (min(values), max(values))
+    )
     return low if low == high else f"{low} to {high}"
 
 
@@ -66,7 +72,7 @@ def images(summary: dict, config: dict, scans: dict) -> str:
         f"{cell if geometry['cell_size'] == 'auto' else ''}is {summary['cell_size']:.1f} "
         "voxels; the threshold between void and solid, "
         f"{level if geometry['threshold'] == 'auto' else ''}is "
-        f"{summary['threshold']:.1f} grey levels."
+        f"{grey_words(summary['threshold'])} grey levels."
     )
 
 
@@ -180,7 +186,7 @@ def alone_words(summary: dict) -> str:
     known = [value for value in found if value is not None]
     if not known:
         return ""
-    return f", where the noise of both images alone would leave {span(known, '.2f')}"
+    return f", where the noise of both images alone would leave {span(known, grey_words)}"
 
 
 def quality(summary: dict) -> str:
@@ -192,8 +198,9 @@ def quality(summary: dict) -> str:
     ultimate = summary["meshes"]["micro"]["ultimate_error"]
     valid = span([100 * one["valid_nodes"] for one in found], ".1f")
     text = (
-        f"The residual in the struts has a standard deviation of {span(residuals, '.2f')} grey levels"
-        f"{alone_words(summary)}. {noise_words(summary)}Interpolation alone, under a rigid sub-voxel "
+        "The residual in the struts has a standard deviation of "
+        f"{span(residuals, grey_words)} grey levels{alone_words(summary)}. "
+        f"{noise_words(summary)}Interpolation alone, under a rigid sub-voxel "
         f"shift without noise {{limits}}, gives {ultimate:.1e} voxel. {valid} % of the nodes have a "
         "residual that the noise of the images explains; the others are flagged."
     )

@@ -6,7 +6,7 @@ import textwrap
 import yaml
 
 from addvc.analysis.localisation import LUMP
-from addvc.errors import AddvcError
+from addvc.errors import AddvcError, grey_words
 from addvc.report.doubts import failed_checks, warnings
 from addvc.report.methods import methods
 from addvc.report.page_tables import (
@@ -56,7 +56,7 @@ def closing_lines(summary: dict, folder: str) -> str:
         found = state[micro]
         lines.append(
             f"  state {state_words(state)}: "
-            f"{VERDICTS[state['verdict']]}; sigma(r) {figure(found['residual_std'], '.2f')}"
+            f"{VERDICTS[state['verdict']]}; sigma(r) {grey_words(found['residual_std'])}"
             f"{alone_words(state)}, "
             f"{found['iterations']} iterations, {found['valid_nodes']:.1%} of nodes valid"
             + flag_words(state.get("struts"))
@@ -93,14 +93,15 @@ def reason_words(struts: dict) -> str:
 def alone_words(state: dict) -> str:
     """What noise alone would leave of the residual, where the images show it."""
     alone = state.get("noise_std")
-    return "" if alone is None else f" (noise alone {alone:.2f})"
+    return "" if alone is None else f" (noise alone {grey_words(alone)})"
 
 
 def error_words(error: dict | None) -> str:
     """Median and 95th percentile of the error, where a truth is known."""
     if not error:
         return ""
-    return f", error median {error['median']:.3f}, p95 {error['p95']:.3f} voxel"
+    median, p95 = (figure(error[key], ".3f") for key in ("median", "p95"))
+    return f", error median {median}, p95 {p95} voxel"
 
 
 def heading(text: str, line: str = "-") -> list[str]:
@@ -145,7 +146,7 @@ def answer(summary: dict) -> list[str]:
     lines = [
         f"Displacement of the solid at {count} loading state{'s' * (count != 1)}. Cell size "
         f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
-        f"threshold {summary['threshold']:.1f} grey levels for a porosity of "
+        f"threshold {grey_words(summary['threshold'])} grey levels for a porosity of "
         f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.",
         "",
     ]

@@ -49,6 +49,11 @@ class Truth:
         """From a file of `save_motions`."""
         return cls(load_foam(path), load_motions(path), load_strains(path))
 
+    @property
+    def states(self) -> int:
+        """How many loading states it has."""
+        return len(self.motions) - 1
+
     def displacement(self, points: np.ndarray, state: int) -> np.ndarray:
         """u (n, 3) of reference points (n, 3), voxels: I_reference(x) = I_state(x + u(x)).
 

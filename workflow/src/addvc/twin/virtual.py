@@ -34,6 +34,11 @@ class VirtualField:
     amplitude: float = 0.5
     wavelength: float = 80.0
 
+    @property
+    def states(self) -> int:
+        """How many loading states it has."""
+        return len(self.strains)
+
     def pulled_back(self, y: np.ndarray, state: int) -> np.ndarray:
         """v (n, 3) at points y (n, 3) of the deformed image."""
         strain = self.strains[state - 1]
