@@ -5,7 +5,7 @@ import pytest
 
 from addvc.config import chooses
 from addvc.correlation import corotational as corotational_module
-from addvc.correlation.corotational import corotational, with_cutoff
+from addvc.correlation.corotational import Course, corotational, with_cutoff
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, risk, trial_of
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.mending import Mending
@@ -98,7 +98,7 @@ def test_a_lost_strut_does_not_ask_for_a_short_length(problem):
     start = 8 * bump[:, None] * np.array([0.0, 0.6, 0.8])
     stage, mending = Stage(True, None, Stop(1e-2, 10)), Mending(2, 6.0, most=0.5)
     lengths = [
-        with_cutoff(problem, deformed, start, stage, LADDER, given).problem.cutoff
+        with_cutoff(Course(problem, start), deformed, stage, LADDER, given).problem.cutoff
         for given in (None, mending)
     ]
     assert lengths[1] > 2 * lengths[0]
@@ -121,7 +121,8 @@ def chosen(problem, monkeypatch):
         monkeypatch.setattr(
             corotational_module, "least_risk", lambda *_: (next(rungs), [{"times": 1.0}])
         )
-        return with_cutoff(problem, image(lambda x: x, 31), rest, PLAN[0], LADDER), lengths
+        course = Course(problem, rest)
+        return with_cutoff(course, image(lambda x: x, 31), PLAN[0], LADDER), lengths
 
     return choose
 
@@ -146,7 +147,7 @@ def test_from_a_shorter_one_the_way_back_is_open(problem, chosen):
 
 def test_a_stage_that_is_not_finite_leaves_the_length_as_it_was(problem, chosen):
     choice, lengths = chosen([-4], [np.nan])
-    assert len(lengths) == 1 and choice.steps == []
+    assert len(lengths) == 1 and not choice.steps
     assert choice.problem.cutoff == problem.cutoff
 
 

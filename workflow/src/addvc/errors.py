@@ -48,8 +48,8 @@ def refuse(faults: Iterable[str], kind: type[AddvcError], what: str = "") -> Non
 
 
 def grey_words(value: float | None) -> str:
-    """A grey level in words: to a tenth, to a hundredth below 10, with three digits where it is small, as
-    an attenuation is; "unknown" for None."""
+    """A grey level in words: to a tenth, to a hundredth below 10, with three digits where it is as small
+    as an attenuation; "unknown" for None."""
     if value is None:
         return "unknown"
     size = abs(value)

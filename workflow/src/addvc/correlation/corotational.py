@@ -20,6 +20,7 @@ import numpy as np
 from addvc.correlation.cutoff import RATIO, Ladder, least_risk, trial_of
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.mending import Mending, mend, trusted
+from addvc.correlation.register import System
 from addvc.correlation.stages import Problem, Stage, Step, early, run, stage_system
 from addvc.correlation.torn import layers
 
@@ -39,6 +40,21 @@ ROUNDS = 2
 """Stages at most to choose l_E in."""
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """How far micro DVC has come: its problem, u (n, 3), the stages behind it, the trials of l_E."""
+
+    problem: Problem
+    u: np.ndarray
+    steps: Sequence[Step] = ()
+    trials: Sequence[dict] = ()
+
+    def after(self, steps: Sequence[Step], problem: Problem | None = None) -> "Course":
+        """With more stages behind it, those of another problem where one is given."""
+        u = steps[-1][0].u if steps else self.u
+        return Course(problem or self.problem, u, [*self.steps, *steps], self.trials)
+
+
 def corotational(
     problem: Problem,
     deformed: np.ndarray,
@@ -51,79 +67,86 @@ def corotational(
 
     Before the last of several come mending and, where there is a ladder, the choice of l_E, with
     bridges of stiffness BRIDGE from then on; what is then in doubt does not count in the last. The
-    solution has the history of all stages and converged if the last one did; of the notes, `stages` has
+    solution has the history of all stages and converged if the last one did; its notes are those of
+    `whole`."""
+    *before, last = stages
+    course = Course(problem, u)
+    for stage in before:
+        course = course.after([run(problem, stage, deformed, course.u)])
+    if not before:
+        mending = ladder = None
+    if mending is not None:
+        mended, steps = mend(problem, deformed, course.u, last, mending)
+        course = course.after(steps, mended)
+    course = replace(course, problem=replace(course.problem, bridge=BRIDGE))
+    if ladder is not None:
+        course = with_cutoff(course, deformed, last, ladder, mending)
+    final = course.problem
+    if mending is not None:
+        final = replace(final, reference=trusted(final.reference, deformed, course.u, mending))
+    return whole(course.after([run(final, last, deformed, course.u)], final))
+
+
+def whole(course: Course) -> tuple[Solution, dict]:
+    """The solution of a course, with the history and the time of all stages, and its notes: `stages` has
     a row of figures for each, `c` and `l_e` are the weight of the energy and its cut-off in the end,
     `risk` the trials of l_E, all in grey levels^2 over the points; `torn`: where bridges are cut
     (voxels), `torn_cells`: the cells that this goes across."""
-    *before, last = stages
-    done: list[Step] = []
-    trials: list[dict] = []
-    for stage in before:
-        done.append(run(problem, stage, deformed, u))
-        u = done[-1][0].u
-    if mending is not None and before:
-        problem, steps = mend(problem, deformed, u, last, mending)
-        done += steps
-        u = done[-1][0].u
-    problem = replace(problem, bridge=BRIDGE)
-    if ladder is not None and before:
-        choice = with_cutoff(problem, deformed, u, last, ladder, mending)
-        problem, u, trials = choice.problem, choice.u, choice.trials
-        done += choice.steps
-    if mending is not None and before:
-        problem = replace(problem, reference=trusted(problem.reference, deformed, u, mending))
-    done.append(run(problem, last, deformed, u))
-    solutions, rows = zip(*done, strict=True)
+    solutions, rows = zip(*course.steps, strict=True)
     history = [step for solution in solutions for step in solution.history]
     seconds = sum(solution.seconds for solution in solutions)
-    notes = {"stages": list(rows), "c": problem.weight, "l_e": problem.cutoff, "risk": trials}
-    notes |= {"torn": [joint.position for joint in problem.cuts]}
-    notes |= {"torn_cells": np.flatnonzero(layers(problem.cuts)).tolist()}
-    return replace(solutions[-1], history=history, seconds=seconds), notes
-
-
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """The problem with the l_E that was chosen, the u (n, 3) from there, the stages that it took, the
-    trials."""
-
-    problem: Problem
-    u: np.ndarray
-    steps: list[Step]
-    trials: list[dict]
+    problem, cuts = course.problem, course.problem.cuts
+    return replace(solutions[-1], history=history, seconds=seconds), {
+        "stages": list(rows),
+        "c": problem.weight,
+        "l_e": problem.cutoff,
+        "risk": list(course.trials),
+        "torn": [joint.position for joint in cuts],
+        "torn_cells": np.flatnonzero(layers(cuts)).tolist(),
+    }
 
 
 def with_cutoff(
-    problem: Problem,
+    course: Course,
     deformed: np.ndarray,
-    u: np.ndarray,
     last: Stage,
     ladder: Ladder,
     mending: Mending | None = None,
-) -> Choice:
-    """The l_E of least risk, from u (n, 3), by stages like the `last` that are ended early.
+) -> Course:
+    """The l_E of least risk, and the stages like the `last`, ended early, that lead there.
 
-    One linear step from u tells the risk of a shorter l_E only so far: from far off a stage is run with
+    One linear step tells the risk of a shorter l_E only so far: from far off a stage is run with
     the new l_E, and the choice made again. A stage that is not finite leaves l_E as it was. What is in
     doubt does not count where it is mended: a few lost struts ask for an l_E that lets them lie anywhere
     (two twins at 28.5 %, with them / without: 10 / 15 voxels)."""
-    stage = replace(last, stop=early(last.stop))
-    found, rung, wanted = Choice(problem, u, [], []), 0, problem
+    stage, rung = replace(last, stop=early(last.stop)), 0
+    system = stage_system(course.problem, stage, course.u)
     for number in range(ROUNDS + 1):
-        system = stage_system(wanted, stage, found.u)
-        if number > 0:
-            step = run(wanted, stage, deformed, found.u, "l_E", system)
-            if not np.isfinite(step[0].history[-1]):
-                return found
-            found = replace(found, problem=wanted, u=step[0].u, steps=[*found.steps, step])
-        if mending is not None:
-            left = trusted(system.reference, deformed, found.u, mending)
-            system = replace(system, reference=left)
-        best, trials = least_risk(trial_of(system, deformed, found.u, ladder), ladder, rung)
-        found = replace(found, trials=[t | {"l_e": t["times"] * wanted.cutoff} for t in trials])
-        wanted = wanted.cut_off(RATIO ** (best - rung))
+        better, course = chosen(course, system, deformed, ladder, rung, mending)
+        wanted = course.problem.cut_off(RATIO ** (better - rung))
         log.info("micro DVC: least risk at l_E = %.3g voxels", wanted.cutoff)
-        if best - rung >= -FAR:
-            break
-        rung = best
-    return replace(found, problem=wanted)
+        if better - rung >= -FAR or number == ROUNDS:
+            return replace(course, problem=wanted)
+        system = stage_system(wanted, stage, course.u)
+        step = run(wanted, stage, deformed, course.u, "l_E", system)
+        if not np.isfinite(step[0].history[-1]):
+            return course
+        rung, course = better, course.after([step], wanted)
+
+
+def chosen(
+    course: Course,
+    system: System,
+    deformed: np.ndarray,
+    ladder: Ladder,
+    rung: int,
+    mending: Mending | None,
+) -> tuple[int, Course]:
+    """The rung of least risk, seen from that of a system, whose u that of the course is; the course with
+    the trials that tell it."""
+    if mending is not None:
+        left = trusted(system.reference, deformed, course.u, mending)
+        system = replace(system, reference=left)
+    best, trials = least_risk(trial_of(system, deformed, course.u, ladder), ladder, rung)
+    named = [trial | {"l_e": trial["times"] * course.problem.cutoff} for trial in trials]
+    return best, replace(course, trials=named)
