@@ -11,7 +11,7 @@ p = 5 the ultimate errors of the default twin are 1.2, .7, 1.7 and .5e-4 voxel (
 where p = 3 leaves 5.3, 3.4, 7.7 and 3.2e-4. It smooths by a variance of 1/2 in place of 1/3 voxel^2,
 which costs 2 to 3 % in the error of registration; a blur of .7 in place of .8 voxel gives that back
 (.0692, .0761, .1031 voxel of micro DVC at states 1 to 3, for .0690, .0760, .1081 with p = 3), at
-ultimate errors of 2.1, 1.3, 2.9 and .8e-4.
+ultimate errors of 2.1, 1.3, 2.9 and .8e-4 (with l_L of 0.6 of the edge; 2.1, 2.2, 5.6 and .6e-4 today).
 """
 
 import numba as nb
