@@ -53,6 +53,30 @@ rule image_noise:
         "../scripts/analysis/image_noise.py"
 
 
+rule platen_faces:
+    input:
+        reference=f"{R}/volumes/volume0.h5",
+        deformed=expand(f"{R}/volumes/volume{{state}}.h5", state=STATES),
+    output:
+        f"{R}/analysis/platens.json",
+    log:
+        f"{R}/logs/platen_faces/all.log",
+    benchmark:
+        f"{R}/benchmarks/platen_faces/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(800, 6.0),
+        runtime=10,
+    params:
+        code=code("analysis/platen_faces.py"),
+        axis=AXIS,
+        states=STATES,
+    script:
+        "../scripts/analysis/platen_faces.py"
+
+
 rule field:
     input:
         meshes=[mesh_of(name) for name in RESULTS],
@@ -500,6 +524,7 @@ rule summary:
             state=STATES,
         ),
         f"{R}/analysis/image_noise.json",
+        f"{R}/analysis/platens.json",
         **({"twin_check": f"{R}/analysis/twin_check.json"} if KIND == "twin" else {}),
     output:
         f"{R}/summary.json",

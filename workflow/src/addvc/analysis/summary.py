@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from addvc import __version__
+from addvc.analysis.platens_check import beside
 from addvc.analysis.strut_table import RAW
 from addvc.analysis.validity import verdict
 from addvc.correlation.cutoff import Ladder
@@ -105,12 +106,14 @@ def mesh_figures(folder: Path, mesh: str) -> dict:
 
 def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh,
-    along the loading axis and each other one."""
+    along the loading axis and each other one; the platens beside its ends."""
     micro, axis = next(mesh for mesh in scope.meshes if mesh.startswith("micro")), scope.axis
     result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.meshes}
     points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")
     trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
-    strains = [compression(points[trusted, d], point["displacement"][trusted, d]) for d in range(3)]
+    along = [(points[trusted, d], point["displacement"][trusted, d]) for d in range(3)]
+    strains = [compression(*one) for one in along]
+    faces = read_json(folder / "analysis/platens.json")[str(state)]
     best = result[micro]
     _, notes = load_solution(folder / f"dvc/start_state{state}.h5")
     micro_notes = load_notes(folder / f"dvc/micro_start_state{state}.h5")
@@ -118,6 +121,7 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     return result | {
         "strain": strains[axis],
         "strain_axes": dict(zip("xyz", strains, strict=True)),
+        "platens": beside(faces, *along[axis]),
         "start": notes["best"],
         "candidates": notes["candidates"],
         "micro_start": micro_notes["best"],

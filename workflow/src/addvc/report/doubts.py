@@ -6,6 +6,7 @@ from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
+APART = 0.5  # voxels between the platens and the ends of a mesh; on twins at most .09
 NOISE_OVER = 1.4  # that over sigma(r): micro DVC of the twin has 1.1, Eq. 10 1.2
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
 
@@ -44,7 +45,7 @@ def strain_warnings(summary: dict) -> list[str]:
     strains = {state["state"]: state["strain"] for state in summary["states"]}
     longer = [number for number, strain in strains.items() if strain < -STRETCHED]
     falls = [n for n in strains if strains[n] < strains.get(n - 1, strains[n]) - STRETCHED]
-    found = axis_warnings(summary)
+    found = axis_warnings(summary) + platen_warnings(summary)
     for n in longer[:1]:
         found.append(
             f"- The specimen gets longer, by {-strains[n]:.1%} in state {n} (at most {STRETCHED:.1%} in "
@@ -58,6 +59,22 @@ def strain_warnings(summary: dict) -> list[str]:
             "not in the order of loading."
         )
     return found
+
+
+def platen_warnings(summary: dict) -> list[str]:
+    """One line where the ends of the finest meso mesh do not go with the platens of the images."""
+    for state in summary["states"]:
+        platens = state.get("platens")
+        if platens and platens["apart"] > APART:
+            (low, high), ends = platens["moved"], platens["ends"]
+            return [
+                f"- In state {state['state']} the platens have moved by {low:+.2f} and {high:+.2f} "
+                "voxels, as the images show, the ends of the finest meso mesh by "
+                f"{ends[0]:+.2f} and {ends[1]:+.2f} (at most {APART:g} apart): unless the foam does not "
+                "touch them, it was lost there. Look at Fig. 6 for the platens and at Fig. 13 for the "
+                "ends; states nearer to each other, or a coarser first mesh in meso.sizes, help."
+            ]
+    return []
 
 
 def axis_warnings(summary: dict) -> list[str]:

@@ -43,7 +43,8 @@ TERMS = (
     "*measured, with doubtful places* (`flagged` in summary.json) where not, *failed* where half are; "
     "in figures that is said of the loop alone, and *inverted* is the share of elements that a "
     "displacement turns inside out, where it is over 1 %. The compression measured is by how "
-    "much the end faces of the finest mesh of meso DVC come nearer, over their distance."
+    "much the end faces of the finest mesh of meso DVC come nearer, over their distance; *by the "
+    "platens* is how much the gap between these closes, as seen in the images without any DVC."
 )
 """What the first page means by the words of its verdicts."""
 
@@ -195,10 +196,13 @@ def what_next(summary: dict) -> list[str]:
 
 
 def state_words(state: dict) -> str:
-    """Number of a state, its nominal strain where there is one, and the measured one."""
+    """Number of a state, its nominal strain where there is one, the measured one, and that of the gap
+    between the platens where the images show it."""
     sense = "compression" if state["strain"] >= 0 else "extension"
     named = "" if state["label"] == f"state {state['state']}" else f"{state['label']}; "
-    return f"{state['state']} ({named}{abs(state['strain']):.1%} {sense} measured)"
+    platens = state.get("platens")
+    gap = f", {platens['strain']:.1%} by the platens" if platens else ""
+    return f"{state['state']} ({named}{abs(state['strain']):.1%} {sense} measured{gap})"
 
 
 def noise_words(state: dict, voxel_um: float) -> str:
