@@ -14,8 +14,8 @@ NEAR = 1.5
 
 
 def platen_faces(reference: np.ndarray, deformed: np.ndarray, axis: int) -> dict | None:
-    """Coordinates of both faces along the axis, `before` in the reference and `now` in a state, both (nx,
-    ny, nz): two each, voxels; None where the images do not both show both platens."""
+    """Coordinates of both faces along the axis, `before` in the reference and `now` in a state, images
+    (nx, ny, nz): two each, voxels; None where these do not both show both platens."""
     faces = moved_faces(reference, deformed, axis)
     if faces is None or not all(seen(faces[0], reference.shape[axis])):
         return None
@@ -23,8 +23,8 @@ def platen_faces(reference: np.ndarray, deformed: np.ndarray, axis: int) -> dict
 
 
 def beside(faces: dict | None, along: np.ndarray, u: np.ndarray) -> dict | None:
-    """What the platens did, and nodes at coordinates `along` (n,) of the axis whose displacement along it
-    is u (n,), voxels: the `strain` of the gap, by how much either face `moved` and the nodes at the
+    """What the platens did, and nodes at coordinates `along` (n,) of the axis whose displacement is
+    u (n,), voxels: the `strain` of the gap, by how much either face `moved` and the nodes at the
     `ends`, and what these are `apart` at most. None without faces, or where none has a node."""
     if faces is None:
         return None
