@@ -5,7 +5,7 @@ import pytest
 
 from addvc.analysis.fields import by_owner, result_fields
 from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_residual
-from addvc.analysis.summary import costs, scan_noise
+from addvc.analysis.summary import costs, said, scan_noise
 from addvc.analysis.truth import error_statistics, errors_at, judged_nodes, load_truth
 from addvc.analysis.validity import nodal_residual, valid_nodes, verdict
 from addvc.correlation.doubt import LIMIT, nodal_square, residual_limit
@@ -329,3 +329,14 @@ def test_the_noise_of_a_scan_is_told_from_that_of_the_blurred_image(blur, factor
     noise = np.random.default_rng(2417).normal(0, 5, (40 * factor,) * 3)
     image = gaussian_blur(bin_mean(noise, factor), blur)[4:-4, 4:-4, 4:-4]
     assert scan_noise(image.std(), blur, factor) == pytest.approx(5, rel=0.03)
+
+
+def test_warnings_of_jobs_are_collected(tmp_path):
+    """Those of rules that the first page does not speak for, and of states that there are."""
+    log = "00:18:10 [smooth {0}] WARNING: this scan has void of 47\n00:18:10 [smooth {0}] done\n"
+    for path, text in (("smooth/state2.log", log.format(2)), ("smooth/state7.log", log.format(7)),
+                       ("volume/state0.log", "00:18:09 [volume 0] done in 1.1 s\n"),
+                       ("meso_dvc/state2.log", log.format(2))):  # fmt: skip
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).write_text(text)
+    assert said(tmp_path, [1, 2]) == ["smooth 2: this scan has void of 47"]

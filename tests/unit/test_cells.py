@@ -113,7 +113,7 @@ def slab(tilt, width, outside=-0.05, within=-0.2, turn=0.0):
 @pytest.mark.parametrize("turn", [0, 50])
 def test_a_slab_has_its_tilt_thickness_and_shares(tilt, turn):
     points, strain, normal = slab(tilt, 13.0, turn=turn)
-    band = localisation(points, strain, 1)
+    band = localisation(points, strain, 1, CELL)
     share = (strain == -0.2).mean()
     assert band["bands"] == 1
     assert band["angle"] == pytest.approx(tilt, abs=1)
@@ -127,37 +127,45 @@ def test_a_slab_has_its_tilt_thickness_and_shares(tilt, turn):
 
 def test_tension_has_bands_too_and_noise_has_none(rng):
     points, strain, _ = slab(20, 12.0)
-    assert localisation(points, -strain, 1)["angle"] == pytest.approx(20, abs=1)
-    noise = localisation(points, 0.5 * LEAST_STRAIN * rng.normal(size=strain.shape), 1)
+    assert localisation(points, -strain, 1, CELL)["angle"] == pytest.approx(20, abs=1)
+    noise = localisation(points, 0.5 * LEAST_STRAIN * rng.normal(size=strain.shape), 1, CELL)
     assert noise["bands"] is None and noise["normal"] is None
-    even = localisation(points, np.full(strain.shape, -0.1), 1)
+    even = localisation(points, np.full(strain.shape, -0.1), 1, CELL)
     assert even["bands"] == 0 and even["volume_share"] == 0 and even["angle"] is None
-    assert localisation(points, np.full(strain.shape, np.nan), 1)["points"] == 0
+    assert localisation(points, np.full(strain.shape, np.nan), 1, CELL)["points"] == 0
 
 
 def test_of_two_bands_the_larger_is_described():
-    points, strain, _ = slab(0, 8.0)
-    strain[:, :2] = -0.2
-    band = localisation(points, strain, 1)
+    points, strain, _ = slab(0, 12.0)
+    strain[:, :3] = -0.2
+    band = localisation(points, strain, 1, CELL)
     assert band["bands"] == 2 and band["centre"][1] == pytest.approx(40, abs=0.5)
     assert band["band_volume_share"] < band["volume_share"]
+
+
+def test_the_last_layer_of_points_is_no_band():
+    """A band that a face of the region cuts: it is blurred by a cell, so that it cannot be as thin."""
+    points, strain, _ = slab(0, 0.0)
+    strain[:, :2] = -0.2
+    band = localisation(points, strain, 1, CELL)
+    assert band["bands"] == 0 and band["normal"] is None and band["volume_share"] > 0.04
 
 
 def test_a_lump_is_not_flat():
     points = slab(0, 12.0)[0]
     ball = np.linalg.norm(points - [30, 40, 30], axis=-1) < 12
-    band = localisation(points, np.where(ball, -0.2, -0.05), 1)
+    band = localisation(points, np.where(ball, -0.2, -0.05), 1, CELL)
     assert band["flatness"] == pytest.approx(1, abs=0.1)
 
 
 def test_a_band_is_compared_with_the_true_one():
     points, strain, _ = slab(20, 12.0)
     _, true, _ = slab(25, 12.0)
-    found, other = (localisation(points, s, 1) for s in (strain, true))
+    found, other = (localisation(points, s, 1, CELL) for s in (strain, true))
     assert compared(found, other, strain, true)["angle_between_normals"] == pytest.approx(5, abs=1)
     same = compared(found, found, strain.ravel(), strain.ravel())
     assert same["strain_rms_difference"] == 0 and same["strain_correlation"] == pytest.approx(1)
-    none = localisation(points, np.zeros(strain.shape), 1)
+    none = localisation(points, np.zeros(strain.shape), 1, CELL)
     assert compared(none, other, strain, true)["angle_between_normals"] is None
 
 

@@ -101,6 +101,14 @@ def test_given_cell_size_is_taken(rng):
     assert (found["cell_size"], found["source"]) == (28.0, "config")
 
 
+def test_a_cell_of_few_voxels_is_warned_of(rng, caplog):
+    """scans.bin was too high: no strut has voxels enough."""
+    measure_cell_size(rng.random((40, 44, 48)), WHOLE, 15.5)
+    assert not caplog.text
+    measure_cell_size(rng.random((40, 44, 48)), WHOLE, 9.1)
+    assert "a cell is 9.1 voxels wide (at least 15; " in caplog.text and "scans.bin" in caplog.text
+
+
 def test_peak_of_a_known_curve_is_found_between_voxels():
     radius = np.arange(60)
     curve = np.sinc(2 * radius / 23.7)

@@ -10,7 +10,7 @@ from snakemake.utils import validate
 from addvc.errors import ScanError
 from addvc.images.hashes import check_different, content_hash
 from addvc.provenance import commit
-from addvc.report.methods import STARTS, listing, methods, span
+from addvc.report.methods import STARTS, listing, methods, region_named, span
 from addvc.report.references import REFERENCES, Citations
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +34,8 @@ def state(number, converged=True, error=None, weight=1e4):
 
 
 def summary(*states):
-    return {"cell_size": 28.8, "threshold": 47.8, "porosity": 0.96, "voxel_size_um": 20.01,
+    return {"cell_size": 28.8, "region": None, "topology": {"bridges": 0},
+            "threshold": 47.8, "porosity": 0.96, "voxel_size_um": 20.01,
             "meshes": {"meso33": MESH, "meso12": MESH, "micro": MESH}, "states": list(states),
             "versions": {"addvc": "0.1.0", "commit": "ab12"}}  # fmt: skip
 
@@ -59,6 +60,20 @@ def test_what_was_done_to_grey_levels_is_told(grey, words):
 
 def told(settings, *states):
     return "\n".join(methods(summary(*states or (state(1), state(2))), settings, SCANS))
+
+
+def test_what_was_put_into_the_mesh_and_what_was_left_out_is_told():
+    """Struts that are rods, and a part of the specimen: a box has bounds, a cylinder a radius."""
+    slab = {"axis": 2, "low": 40.0, "high": 90.0, "radius": 35.0, "bounds": None}
+    given = summary(state(1)) | {"region": slab, "topology": {"bridges": 7}}
+    text = "\n".join(methods(given, config(), SCANS))
+    assert "The struts of a part of the specimen (40.0 to 90.0 voxels along z, within 35.0" in text
+    assert "7 struts that the threshold broke, but a lower one shows whole, were put in" in text
+    box = slab | {"axis": 1, "radius": None, "bounds": [[1.0, 9.0], [2.0, 8.5]]}
+    assert (
+        region_named(box) == "40.0 to 90.0 voxels along y, 1.0 to 9.0 along x, 2.0 to 8.5 along z"
+    )
+    assert "of a part" not in told(config()) and "put in" not in told(config())
 
 
 def test_the_numbers_are_those_of_the_summary():

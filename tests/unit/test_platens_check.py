@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addvc.analysis.platens_check import beside, platen_faces
+from addvc.analysis.platens_check import beside, opened, platen_faces
 from addvc.report.doubts import strain_warnings
 from addvc.report.words import state_words
 
@@ -40,6 +40,19 @@ def test_one_platen_or_none_tells_nothing(foam, rows):
 def test_a_mesh_that_ends_elsewhere_is_not_compared():
     faces = {"before": [10.0, 50.0], "now": [10.0, 48.0]}
     assert beside(faces, np.linspace(20, 50, 31), np.zeros(31)) is None
+
+
+def test_scans_in_a_wrong_order_are_told_at_once():
+    """The gap closes from state to state: 40, 38, 30; in any other order it opens somewhere."""
+    faces = lambda first, *rest: {  # noqa: E731
+        n: {"before": [10.0, 10.0 + first], "now": [10.0, 10.0 + gap]}
+        for n, gap in enumerate(rest, 1)
+    }
+    assert opened(faces(40, 38, 30)) == ""
+    assert opened({1: None, 2: None}) == ""
+    assert "38.0 voxels apart in state 2, in state 1 30.0" in opened(faces(40, 30, 38))
+    assert "40.0 voxels apart in state 1, in the reference 30.0" in opened(faces(30, 40, 38))
+    assert opened({1: None} | {2: faces(40, 38)[1]}) == ""
 
 
 def test_ends_that_do_not_go_with_the_platens_are_warned_of():

@@ -11,7 +11,7 @@ from scipy.spatial import Voronoi
 from scipy.stats import norm
 
 from addvc.errors import GeometryError
-from addvc.images.specimen import Specimen, find_platens, find_specimen
+from addvc.images.specimen import Specimen, find_platens, find_specimen, platen_faces
 
 SHAPE, AXIS, CENTRE, RADIUS, FACES = (100, 110, 104), 1, (48.3, 53.1), 41.0, (9.3, 99.6)
 VOID, FOAM, PLATEN, CELL = 20.0, 110.0, 150.0, 28.0
@@ -122,6 +122,19 @@ def test_platen_at_one_end_or_none(faces):
     else:
         expected = (-0.5 if faces[0] is None else 9.3, 109.5 if faces[1] is None else 99.6)
         assert_allclose(found, expected, atol=0.2)
+
+
+@pytest.mark.parametrize(
+    "faces, ends", [((9.3, None), "upper"), ((None, None), "lower and upper"), ((9.3, 99.6), None)]
+)
+def test_an_end_without_a_platen_is_warned_of(faces, ends, caplog):
+    """A crop may have taken it off; `none` says that it is right."""
+    image = scanned(cylinder(), faces=faces)
+    platen_faces(image, AXIS, "auto")
+    assert (f"no platen is seen at the {ends} end" in caplog.text) == bool(ends)
+    caplog.clear()
+    platen_faces(image, AXIS, "none")
+    assert not caplog.text
 
 
 @pytest.mark.parametrize("face", [8.0, 8.25, 8.5, 8.75])

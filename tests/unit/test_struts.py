@@ -552,14 +552,14 @@ def table_of(energies, valid=None):
     columns["dominance"] = np.array(["bending"] * len(energies))
     columns["valid"] = np.ones(len(energies)) if valid is None else np.asarray(valid)
     columns["flag"] = np.where(columns["valid"] > 0, "none", "residual")
-    return columns | {"whole": np.ones(len(energies))}
+    return columns | {"whole": np.ones(len(energies)), "bridge": np.arange(len(energies)) == 0}
 
 
 def test_the_share_of_the_foam_is_weighted_with_energy_over_valid_struts():
     found = foam(table_of([[9, 1, 0], [0, 90, 0], [0, 0, 5]], valid=[1, 1, 0]))
     assert found["valid"] == 2
     assert found["flagged"] == found["flags"]["residual"] == 1
-    assert sum(found["flags"].values()) == 1
+    assert sum(found["flags"].values()) == found["bridged"] == 1
     assert_allclose(found["bending_share"], 9 / 100)
     assert_allclose(found["stretching_share"], 91 / 100)
 

@@ -17,6 +17,8 @@ from addvc.report.doubts import strain_warnings
 from addvc.report.page_tables import results_table
 from addvc.report.thumbnail import thumbnail
 from addvc.report.words import (
+    REASONS,
+    bridge_words,
     check_verdicts,
     closing_lines,
     front_page,
@@ -24,6 +26,7 @@ from addvc.report.words import (
     micro_name,
     noise_words,
     state_words,
+    strut_words,
     warnings,
 )
 
@@ -86,6 +89,7 @@ def state(number, verdict, **micro):
 def summary(*states):
     return {
         "case": "foam-2_b",
+        "methods": {"micro": "eq10"},
         "cell_size": 27.98,
         "threshold": 49.06,
         "porosity": 0.96,
@@ -194,7 +198,7 @@ def test_closing_lines_tell_how_many_struts_are_flagged():
     flags = {"broken": 8, "residual": 15, "equilibrium": 0, "shape": 0}
     struts = {"valid": 341, "flagged": 23, "flags": flags, "bending_share": 0.7}
     lines = closing_lines(summary(GOOD | {"struts": struts}), "results/foam")
-    assert "23 of 364 struts flagged: 8 broken at a neck, 15 in doubt" in lines
+    assert "23 of 364 struts flagged: 8 broken by the threshold, 15 in doubt" in lines
     struts |= {"valid": 364, "flagged": 0, "flags": dict.fromkeys(flags, 0)}
     assert "0 of 364 struts flagged, " in closing_lines(summary(GOOD | {"struts": struts}), "r")
     assert "struts" not in closing_lines(summary(GOOD | {"struts": None}), "results/foam")
@@ -299,11 +303,11 @@ def test_a_state_says_how_well_its_nodes_are_known():
 def test_the_front_page_tells_of_a_band():
     band = {"normal": [0, 1, 0], "thickness": 24.6, "angle": 23.9, "flatness": 0.4,
             "factor": 1.5, "band_strain_share": 0.225, "bands": 3,
-            "band_volume_share": 0.131}  # fmt: skip
+            "band_volume_share": 0.131, "mean_strain": -0.123}  # fmt: skip
     told = front_page(summary(GOOD | {"cells": band}), CONFIG, SCANS)
     assert (
-        "Largest of 3 bands of over 1.5 times the mean strain: 13% of the volume, with 22% of the "
-        "compression, 25 voxels" in told
+        "Largest of 3 bands of over 1.5 times the mean strain of cells, 12.3%: 13% of the volume, with "
+        "22% of the compression, 25 voxels" in told
     )
     assert "24 degrees" in told
     lump = front_page(summary(GOOD | {"cells": band | {"flatness": 0.9}}), CONFIG, SCANS)
@@ -311,6 +315,43 @@ def test_the_front_page_tells_of_a_band():
     assert "times the mean" not in front_page(
         summary(GOOD | {"cells": dict.fromkeys(band)}), CONFIG, SCANS
     )
+
+
+def test_the_front_page_says_of_which_part_it_is():
+    slab = {"axis": 1, "low": 40.0, "high": 90.0, "radius": 35.0, "bounds": None}
+    told = front_page(summary(GOOD) | {"region": slab}, CONFIG, SCANS)
+    assert "of a part of the specimen** (40.0 to 90.0 voxels along y, within 35.0" in told
+    assert "part of the specimen" not in front_page(summary(GOOD), CONFIG, SCANS)
+
+
+def test_a_share_of_bending_stands_beside_what_was_measured():
+    """The noise alone says little of it: what equilibrium takes off says more."""
+    struts = {"valid": 75, "flagged": 5, "flags": dict.fromkeys(REASONS, 0), "bending_share": 0.8,
+              "bending_share_std": 0.006, "bending_share_raw": 0.83, "bridged": 20}  # fmt: skip
+    told = strut_words(struts)
+    assert "80% of the energy of 75 valid struts" in told
+    assert (
+        "83% as measured, before equilibrium takes noise off; noise" in told and "by 0.6%" in told
+    )
+    given = summary(GOOD | {"struts": struts}) | {"topology": {"bridges": 22}}
+    assert (
+        "22 struts that" in bridge_words(given)[1]
+        and "25% of the struts have" in bridge_words(given)[1]
+    )
+
+
+def test_what_jobs_have_warned_of_is_on_the_first_page():
+    told = warnings(summary(REAL) | {"said": ["smooth 2: this scan has void of 47.27"]})
+    assert "- Smooth 2: this scan has void of 47.27." in told
+
+
+def test_methods_that_were_not_run_are_not_spoken_of():
+    counts = {"stubs": 3, "necks": 0, "welds": 0, "bridges": 0}
+    given = summary(GOOD) | {"topology": counts}
+    for method, has in (("eq10", True), ("corotational", False)):
+        told = front_page(given | {"methods": {"micro": method}}, CONFIG, SCANS)
+        told = told.split("Methods, to paste")[0]
+        assert ("eq10" in told) == has and ("Elastic energy (`corotational`)" in told) != has
 
 
 def test_the_front_page_leads_to_the_scene_and_to_paraview():

@@ -63,6 +63,7 @@ rule platen_faces:
         f"{R}/logs/platen_faces/all.log",
     benchmark:
         f"{R}/benchmarks/platen_faces/all.tsv"
+    priority: 10  # it tells of scans in a wrong order
     conda:
         ENV
     threads: 1
@@ -492,6 +493,7 @@ rule summary:
         f"{R}/geometry/threshold.json",
         expand(f"{R}/geometry/{{mesh}}.json", mesh=[*MESO, "micro"]),
         f"{R}/geometry/topology.json",
+        f"{R}/geometry/region.json",
         expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
         expand(
             f"{R}/dvc/{{name}}_state{{state}}.h5",
@@ -545,6 +547,8 @@ rule summary:
         states=LABELS,
         scope={
             "meshes": [*MESO, *MICRO],
+            "methods": METHODS,
+            "region": config["micro"]["region"],
             "finest": FINEST,
             "axis": AXIS,
             "truth": HAS_TRUTH,

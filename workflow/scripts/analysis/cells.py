@@ -14,7 +14,7 @@ with job(snakemake) as log:
     point = read_vtu(source.field)[2]
     weight, valid = nodal_volumes(mesh), point["valid"].ravel()
     found = cell_strain(mesh.points, point["displacement"], weight, valid, size)
-    figures = localisation(found.points, found.along(axis), axis)
+    figures = localisation(found.points, found.along(axis), axis, size)
     log.info(told(figures))
     write_columns(snakemake.output.table, columns(found, axis))
     notes = {"localisation": figures, "meaning": MEANING, "columns": described()}

@@ -16,7 +16,7 @@ with job(snakemake) as log:
     mesh, size = read_mesh(source.mesh), read_json(source.cell_size)["cell_size"]
     u = load_truth(source.truth).displacement(mesh.points, state)
     true = cell_strain(mesh.points, u, nodal_volumes(mesh), np.ones(len(u)), size)
-    band = localisation(true.points, true.along(axis), axis)
+    band = localisation(true.points, true.along(axis), axis, size)
     strain = read_columns(source.table)["axial_strain"]
     measured = read_json(source.notes)["localisation"]
     figures = compared(measured, band, strain, true.along(axis).ravel())

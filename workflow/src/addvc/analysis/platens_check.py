@@ -9,6 +9,9 @@ import numpy as np
 
 from addvc.images.platens import moved_faces, seen
 
+WIDER = 0.003
+"""By which share the gap may grow from state to state."""
+
 NEAR = 1.5
 """Voxels from a face within which nodes are at it."""
 
@@ -20,6 +23,26 @@ def platen_faces(reference: np.ndarray, deformed: np.ndarray, axis: int) -> dict
     if faces is None or not all(seen(faces[0], reference.shape[axis])):
         return None
     return {"before": list(faces[0]), "now": list(faces[1])}
+
+
+def opened(faces: dict[int, dict | None]) -> str:
+    """Where the gap between the platens is wider in a state than in the one before: what to check, ""
+    where it is in none. `faces`: of `platen_faces`, by state, in their order."""
+    last, before = "the reference", None
+    for state, one in faces.items():
+        if one is None:
+            continue
+        before = np.ptp(one["before"]) if before is None else before
+        now = np.ptp(one["now"])
+        if now > (1 + WIDER) * before:
+            return (
+                f"the platens are {now:.1f} voxels apart in state {state}, in {last} {before:.1f} (at "
+                f"most {1 + WIDER:g} times that under a growing load): unless the specimen was unloaded "
+                "or pulled, scans.states is not in the order of loading, or scans.reference not the scan "
+                "at rest"
+            )
+        last, before = f"state {state}", now
+    return ""
 
 
 def beside(faces: dict | None, along: np.ndarray, u: np.ndarray) -> dict | None:

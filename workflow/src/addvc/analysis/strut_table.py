@@ -205,8 +205,9 @@ def dominance(energy: StrutEnergy) -> str:
 
 
 def foam(columns: dict[str, Sequence], suffix: str = "") -> dict:
-    """How many struts are valid, and flagged, by reason; of the valid ones the shares of the energy of
-    all of them with the deviation of that of bending, number of struts of each dominance."""
+    """How many struts are valid, flagged, by reason, and have a bridge; of the valid ones the shares of
+    the energy of all of them with the deviation of that of bending, number of struts of each
+    dominance."""
     valid = np.asarray(columns["valid"], dtype=float) > 0
     energies = np.array([np.asarray(columns[kind + suffix], float)[valid] for kind in KINDS])
     total = np.nansum(energies)
@@ -215,6 +216,7 @@ def foam(columns: dict[str, Sequence], suffix: str = "") -> dict:
         "valid": int(valid.sum()),
         "flagged": int((~valid).sum()),
         "flags": {flag: flags.count(flag) for flag in FLAGS},
+        "bridged": int(np.sum(np.asarray(columns["bridge"], dtype=float) > 0)),
     }
     if not total > 0:
         return counts | {"bending_share": None}

@@ -36,13 +36,22 @@ PACKAGES = (
 )
 
 
+SPEAKING = ("volume", "smooth", "specimen", "cell_size", "threshold", "truth_error")
+"""Rules whose warnings the first page does not give in words of its own."""
+
+WARNED = re.compile(r"^\S+ \[([^]]+)\] WARNING: (.+)$", re.MULTILINE)
+
+
 @dataclass(frozen=True)
 class Scope:
-    """What there is to sum up: results from meso to micro, the finest meso mesh, the loading axis,
-    whether there is a truth and a free-form start, the pre-filter (voxels) and the binning of scans,
-    rules whose cost does not count since they may run before or after."""
+    """What there is to sum up: results from meso to micro, the method of each of the latter, the finest
+    meso mesh, the loading axis, `micro.region`, whether there is a truth and a free-form start, the
+    pre-filter (voxels) and the binning of scans, rules whose cost does not count since they may run
+    before or after."""
 
     meshes: list[str]
+    methods: dict[str, str]
+    region: str | dict
     finest: str
     axis: int
     truth: bool
@@ -59,6 +68,8 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
     threshold, scans = read("geometry/threshold.json"), read("input.json")
     return {
         "case": case,
+        "methods": scope.methods,
+        "region": None if scope.region == "all" else read("geometry/region.json"),
         "cell_size": read("geometry/cell_size.json")["cell_size"],
         "threshold": threshold["threshold"],
         "porosity": threshold["porosity"],
@@ -71,10 +82,23 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
             {"state": state, "label": label} | state_figures(folder, state, scope)
             for state, label in states.items()
         ],
+        "said": said(folder / "logs", states),
         "cost": costs(folder / "benchmarks", scope.apart, states, scope.meshes),
         "versions": {"addvc": __version__, "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
     }
+
+
+def said(folder: Path, states: Iterable[int]) -> list[str]:
+    """What jobs of the rules SPEAKING have warned of, as their logs have it: "smooth 2: ..."; not what
+    earlier configurations have left, of other states."""
+    known = {"all", *(f"state{state}" for state in (0, *states))}
+    found = []
+    for rule in SPEAKING:
+        for path in sorted(folder.glob(f"{rule}/*.log")):
+            if path.stem in known:
+                found += WARNED.findall(path.read_text())
+    return [f"{name}: {words}" for name, words in found]
 
 
 def scan_noise(std: float, blur: float, factor: int) -> float:

@@ -1,13 +1,18 @@
 """Fig. 4: the cell size, where the radially averaged autocorrelation has its secondary peak."""
 
+import logging
+
 import numpy as np
 from scipy import fft, ndimage
 
 from addvc.errors import GeometryError
 from addvc.images.specimen import Specimen
 
+log = logging.getLogger(__name__)
+
 LARGEST_BOX = 200  # voxels: a larger one says nothing more, and its FFT would take gigabytes
 PLATEN_MARGIN = 3.0
+FEW = 15  # voxels: half of what the default twin and the paper have
 REACH = 0.6  # of the smallest side: longer shifts have few pairs of voxels
 
 
@@ -76,13 +81,20 @@ def secondary_peak(radius: np.ndarray, curve: np.ndarray) -> float:
 def measure_cell_size(volume: np.ndarray, specimen: Specimen, setting: str | float) -> dict:
     """The cell size in voxels ("auto": measured; a number: given) and the curve of Fig. 4.
 
-    Raises GeometryError when it must be measured and there is no secondary peak."""
+    Warns where it is below FEW. Raises GeometryError when it must be measured and there is no secondary
+    peak."""
     box = central_box(specimen, volume.shape)
     mask = specimen.voxel_mask(volume.shape)[box]
     reach = int(REACH * min(mask.shape))
     radius, curve = radial_average(autocorrelation(volume[box], mask), reach)
     size = secondary_peak(radius, curve) if setting == "auto" else float(setting)
     source = "measured" if setting == "auto" else "config"
+    if size < FEW:
+        log.warning(
+            "WARNING: a cell is %.1f voxels wide (at least %d; 25 to 40 are good), so that its struts "
+            "have hardly a voxel across and no result of micro DVC can be trusted; lower scans.bin, or "
+            "give geometry.cell_size where it is not this", size, FEW,
+        )  # fmt: skip
     return {
         "cell_size": size,
         "source": source,

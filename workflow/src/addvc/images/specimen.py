@@ -4,6 +4,7 @@ All coordinates are voxels of the image at hand, voxel k reaching from k - 0.5 t
 directions across the loading axis are ordered by increasing axis index.
 """
 
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from addvc.errors import GeometryError
 from addvc.images.levels import bin_mean, to_fine
 from addvc.images.orientation import check_no_platens_elsewhere, check_outline
-from addvc.images.platens import find_platens, given_faces
+from addvc.images.platens import find_platens, given_faces, seen
 from addvc.images.silhouette import (
     Rectangle,
     corners_filled,
@@ -25,6 +26,8 @@ from addvc.images.silhouette import (
 __all__ = ["Specimen", "find_platens", "find_specimen", "platen_faces", "solid_threshold"]
 
 BIN = 2  # lines of solid outlast the noise better in means of 2 x 2 x 2 voxels
+log = logging.getLogger(__name__)
+
 MIN_ROWS = 8  # voxels between the platens
 FACE_MARGIN = 3  # rows left out at each platen: the blur of its face
 OTSU_VOXELS = 2e6  # more are thinned out
@@ -170,7 +173,7 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
 
     platens: as in `find_specimen`. Raises GeometryError when it is none of these, when given
     coordinates are reversed or leave the image, when 'auto' finds platens along another axis only, or
-    when less than 8 rows lie between the faces.
+    when less than 8 rows lie between the faces. Warns where 'auto' finds none at an end.
     """
     n = volume.shape[axis]
     low, high = -0.5, n - 0.5
@@ -181,6 +184,15 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
         if found is None:
             check_no_platens_elsewhere(volume, axis)
         low, high = found or (low, high)
+        ends = [
+            end for end, it in zip(("lower", "upper"), seen((low, high), n), strict=True) if not it
+        ]
+        if ends:
+            log.warning(
+                "WARNING: no platen is seen at the %s end of the image along the loading axis, which is "
+                "taken for that of the specimen; crop less if there is one, else say scans.platens: none, "
+                "or [LOW, HIGH]", " and ".join(ends),
+            )  # fmt: skip
     elif platens != "none":
         raise GeometryError(f"platens is '{platens}'; use auto, none or [LOW, HIGH]")
     if high - low < MIN_ROWS:

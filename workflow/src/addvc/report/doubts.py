@@ -1,11 +1,18 @@
 """What to distrust in a result: the section of the first page that is never silently empty."""
 
+from collections.abc import Iterable
+
 from addvc.analysis.balance import refusal
+from addvc.config import METHODS
 from addvc.errors import grey_words
 from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
+STUBS = {
+    False: "Elastic energy (`corotational`) holds them, so its results can be used.",
+    True: "Trust `eq10` least there.",
+}  # by whether a method has an equilibrium gap
 APART = 0.5  # voxels between the platens and the ends of a mesh; on twins at most .09
 NOISE_OVER = 1.4  # that over sigma(r): micro DVC of the twin has 1.1, Eq. 10 1.2
 NOISE_TIMES = 1.5  # sigma(r) over that of noise alone; under the truth of the twin 1.0 to 1.25
@@ -22,7 +29,8 @@ def warnings(summary: dict) -> list[str]:
             f"- {1 - kept:.0%} of the segmented solid is not attached to the largest piece "
             "and was left out; lower mesh.size, the porosity or images.blur."
         )
-    found += topology_warnings(summary.get("topology"))
+    found += [f"- {words[0].upper()}{words[1:]}." for words in summary.get("said", [])]
+    found += topology_warnings(summary.get("topology"), summary["methods"].values())
     if not any(state[micro_name(summary)]["error"] for state in summary["states"]):
         found.append(
             "- The error on these images is not known: the residual and the ultimate error "
@@ -91,8 +99,8 @@ def axis_warnings(summary: dict) -> list[str]:
     return []
 
 
-def topology_warnings(counts: dict | None) -> list[str]:
-    """One line when the mesh of the struts has stubs, necks or welds."""
+def topology_warnings(counts: dict | None, methods: Iterable[str]) -> list[str]:
+    """One line when the mesh of the struts has stubs, necks or welds; what the methods make of them."""
     names = {
         "stubs": "dangling stub{s}",
         "necks": "neck{s} thinner than a square voxel",
@@ -105,10 +113,11 @@ def topology_warnings(counts: dict | None) -> list[str]:
     ]
     if not some:
         return []
+    gaps = {METHODS[method].gap for method in methods}
     return [
         f"- The mesh of the struts has {', '.join(some)}, of which a foam has none: see the figure of "
-        "its topology, and geometry/topology.json for where. Elastic energy (`corotational`) holds "
-        "them, so its results can be used; trust `eq10` least there. For fewer of them, first lower "
+        "its topology, and geometry/topology.json for where. "
+        f"{' '.join(text for gap, text in STUBS.items() if gap in gaps)} For fewer of them, first lower "
         "images.blur, then mesh.size; a porosity that is too high breaks struts too."
     ]
 

@@ -101,15 +101,40 @@ def finer(summary: dict) -> list[str]:
     return [name for name in summary["meshes"] if not name.startswith("micro")][1:]
 
 
+def region_named(region: dict) -> str:
+    """A slab of the specimen, in voxels: `micro.region` as it was cut out."""
+    axes = [name for n, name in enumerate("xyz") if n != region["axis"]]
+    slab = f"{region['low']:.1f} to {region['high']:.1f} voxels along {'xyz'[region['axis']]}"
+    if region["radius"] is not None:
+        return f"{slab}, within {region['radius']:.1f} of its middle"
+    sides = (
+        f"{low:.1f} to {high:.1f} along {name}"
+        for name, (low, high) in zip(axes, region["bounds"], strict=True)
+    )
+    return f"{slab}, {', '.join(sides)}"
+
+
+def mesh_words(summary: dict, config: dict) -> str:
+    """The mesh of the struts: of which part of the specimen, how it was made, what was put in."""
+    mesh, region = summary["meshes"]["micro"], summary.get("region")
+    where = "" if region is None else f" of a part of the specimen ({region_named(region)})"
+    by = "" if config["mesh"]["backend"] == "pytetwild" else " by isosurface stuffing {stuffing}"
+    bridges = (summary.get("topology") or {}).get("bridges")
+    put = (
+        f"; {bridges} struts that the threshold broke, but a lower one shows whole, were put "
+        "in as rods of the section that the grey level tells, half as stiff as the rest"
+        if bridges
+        else ""
+    )
+    return (
+        f"The struts{where} were meshed{by} with {mesh['cells']} tetrahedra ({mesh['nodes']} nodes, "
+        f"mean volume {mesh['mean_volume']:.3g} voxel^3{put})."
+    )
+
+
 def micro(summary: dict, config: dict) -> str:
     """The mesh of the struts and each method of micro DVC."""
-    mesh = summary["meshes"]["micro"]
-    by = " by isosurface stuffing {stuffing}"
-    lattice = config["mesh"]["backend"] != "pytetwild"
-    text = (
-        f"The struts were meshed{by if lattice else ''} with {mesh['cells']} tetrahedra "
-        f"({mesh['nodes']} nodes, mean volume {mesh['mean_volume']:.3g} voxel^3)."
-    )
+    text = mesh_words(summary, config)
     section = config["micro"]
     options = micro_options(section, summary["cell_size"], loading_axis(config))
     along = style.AXES[loading_axis(config)]

@@ -64,10 +64,12 @@ def convergence_table(summary: dict) -> list[str]:
     return list_table([*header, "last rms(du), voxel", "converged"], rows)
 
 
-CONVERGENCE_WORDS = (
-    "The coarsest mesh has no regularisation; the lengths of eq10, which every state shares, are in "
-    "Table 2."
-)
+def convergence_words(summary: dict) -> str:
+    """What the lengths of the table are not."""
+    words = "The coarsest mesh has no regularisation"
+    if "eq10" in summary["methods"].values():
+        words += "; the lengths of eq10, which every state shares, are in Table 2"
+    return words + "."
 
 
 def cutoff(result: dict) -> str:
@@ -114,12 +116,17 @@ def cost_table(cost: dict) -> list[str]:
 
 
 def scans_table(scans: dict) -> list[str]:
-    """The input files."""
+    """The input files, the reference first."""
     rows = [
-        [f"``{row['path']}``", " x ".join(map(str, row["shape"])), row["dtype"]]
-        for row in scans["scans"]
+        [
+            str(n or "reference"),
+            f"``{row['path']}``",
+            " x ".join(map(str, row["shape"])),
+            row["dtype"],
+        ]
+        for n, row in enumerate(scans["scans"])
     ]
-    return list_table(["file", "shape, voxels", "type"], rows)
+    return list_table(["state", "file", "shape, voxels", "type"], rows)
 
 
 def hashes_list(hashes: dict[str, str]) -> list[str]:

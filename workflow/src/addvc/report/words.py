@@ -8,11 +8,11 @@ import yaml
 from addvc.analysis.localisation import LUMP
 from addvc.errors import AddvcError, grey_words
 from addvc.report.doubts import failed_checks, warnings
-from addvc.report.methods import methods
+from addvc.report.methods import methods, region_named
 from addvc.report.page_tables import (
-    CONVERGENCE_WORDS,
     RESIDUAL_WORDS,
     convergence_table,
+    convergence_words,
     cost_table,
     figure,
     hashes_list,
@@ -29,7 +29,7 @@ VERDICTS = {
 }
 
 REASONS = {
-    "broken": "broken at a neck",
+    "broken": "broken by the threshold",
     "residual": "in doubt",
     "equilibrium": "far from equilibrium",
     "shape": "unlike a beam",
@@ -118,7 +118,7 @@ def front_page(summary: dict, config: dict, scans: dict, picture: str | None = N
     lines += heading("Warnings and failures") + warnings(summary)
     lines += heading("What next") + what_next(summary)
     lines += [*heading("Residual and error of each mesh"), RESIDUAL_WORDS, *results_table(summary)]
-    lines += [*heading("Convergence"), CONVERGENCE_WORDS, *convergence_table(summary)]
+    lines += [*heading("Convergence"), convergence_words(summary), *convergence_table(summary)]
     lines += heading("Meshes") + meshes_table(summary)
     lines += heading("Methods, to paste") + methods(summary, config, scans)
     lines += heading("Scans") + scans_table(scans) + hashes_list(scans.get("sha256", {}))
@@ -149,6 +149,7 @@ def answer(summary: dict) -> list[str]:
         f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
         f"threshold {grey_words(summary['threshold'])} grey levels for a porosity of "
         f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.",
+        *region_words(summary.get("region")),
         "",
     ]
     for state in summary["states"]:
@@ -159,7 +160,7 @@ def answer(summary: dict) -> list[str]:
             f"valid{noise_words(state, size)}{error_words(found['error'])}."
             f"{strut_words(state.get('struts'))}" + band_words(state.get("cells"))
         )
-    lines += ["", TERMS, *bridge_words(summary.get("topology"))]
+    lines += ["", TERMS, *bridge_words(summary)]
     return [*lines, "", cost_words(summary["cost"])]
 
 
@@ -213,17 +214,32 @@ def noise_words(state: dict, voxel_um: float) -> str:
     return f", known to {rms:.3f} voxel ({rms * voxel_um:.2g} micrometres) as far as noise goes"
 
 
-def bridge_words(counts: dict | None) -> list[str]:
-    """How many struts are in the mesh though the threshold had broken them."""
-    if not counts or not counts.get("bridges"):
+def region_words(region: dict | None) -> list[str]:
+    """Which part of the specimen micro DVC, struts and cells are of, where it is not the whole."""
+    if region is None:
         return []
-    count, rods = counts["bridges"], "a rod" if counts["bridges"] == 1 else "rods"
+    return [
+        "",
+        f"**Micro DVC, its struts and cells are of a part of the specimen** ({region_named(region)}). "
+        "The compression named here is that of the whole specimen.",
+    ]
+
+
+def bridge_words(summary: dict) -> list[str]:
+    """How many struts are in the mesh though the threshold had broken them, of how many."""
+    count = (summary.get("topology") or {}).get("bridges")
+    if not count:
+        return []
+    struts = next((state["struts"] for state in summary["states"] if state.get("struts")), None)
+    known = struts["valid"] + struts["flagged"] if struts else 0
+    share = f"; {struts['bridged'] / known:.0%} of the struts have one" if known else ""
     return [
         "",
         f"{count} strut{'s' * (count > 1)} that the threshold had broken or lost, but a lower one shows "
-        f'whole, went into the mesh as {rods} (`mesh.mend`): "stubs, necks and welds" beyond the paper '
-        "shows where, `bridge` in the table of struts tells which. Struts flagged as broken are others, "
-        "and rods that hold by less than a quarter of their section.",
+        f"whole, went into the mesh as {'a rod' if count == 1 else 'rods'} (`mesh.mend`{share}): "
+        '"stubs, necks and welds" beyond the paper shows where, `bridge` in the table of struts tells '
+        "which. Struts flagged as broken are others, and rods that hold by less than a quarter of their "
+        "section.",
     ]
 
 
@@ -262,12 +278,12 @@ def strut_words(struts: dict | None) -> str:
     if struts["bending_share"] is None:
         return f" No share of bending: {count}."
     verdict = "Bending" if struts["bending_share"] > 0.5 else "Not bending"
-    doubt = struts.get("bending_share_std")
-    more = f" (standard deviation {doubt:.1%})" if doubt else ""
-    share = f"{struts['bending_share']:.0%}{more} of the energy of {count} is in bending"
-    raw = struts.get("bending_share_raw")
-    measured = "" if raw is None else f", {raw:.0%} before equilibrium takes noise off"
-    return f" {verdict}-dominated: {share}{measured}."
+    share = f"{struts['bending_share']:.0%} of the energy of {count} is in bending"
+    raw, doubt = struts.get("bending_share_raw"), struts.get("bending_share_std")
+    told = [] if raw is None else [f"{raw:.0%} as measured, before equilibrium takes noise off"]
+    told += [f"noise and scatter alone move it by {doubt:.1%}"] if doubt else []
+    more = f" ({'; '.join(told)})" if told else ""
+    return f" {verdict}-dominated: {share}{more}."
 
 
 def band_words(cells: dict | None) -> str:
@@ -282,7 +298,8 @@ def band_words(cells: dict | None) -> str:
     )
     which = "One band" if cells["bands"] == 1 else f"Largest of {cells['bands']} bands"
     return (
-        f" {which} of over {cells['factor']:g} times the mean strain: "
+        f" {which} of over {cells['factor']:g} times the mean strain of cells, "
+        f"{abs(cells['mean_strain']):.1%}: "
         f"{cells['band_volume_share']:.0%} of the volume, with {cells['band_strain_share']:.0%} of the "
         f"compression, {shape}."
     )
