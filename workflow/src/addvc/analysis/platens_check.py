@@ -38,8 +38,8 @@ def opened(faces: dict[int, dict | None]) -> str:
             return (
                 f"the platens are {now:.1f} voxels apart in state {state}, in {last} {before:.1f} (at "
                 f"most {1 + WIDER:g} times that under a growing load): unless the specimen was unloaded "
-                "or pulled, scans.states is not in the order of loading, or scans.reference not the scan "
-                "at rest"
+                "or pulled, scans.states is not in the order of loading, or scans.reference not the "
+                "scan at rest"
             )
         last, before = f"state {state}", now
     return ""

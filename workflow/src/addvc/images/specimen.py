@@ -184,15 +184,7 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
         if found is None:
             check_no_platens_elsewhere(volume, axis)
         low, high = found or (low, high)
-        ends = [
-            end for end, it in zip(("lower", "upper"), seen((low, high), n), strict=True) if not it
-        ]
-        if ends:
-            log.warning(
-                "WARNING: no platen is seen at the %s end of the image along the loading axis, which is "
-                "taken for that of the specimen; crop less if there is one, else say scans.platens: none, "
-                "or [LOW, HIGH]", " and ".join(ends),
-            )  # fmt: skip
+        _warn_of_ends(low, high, n)
     elif platens != "none":
         raise GeometryError(f"platens is '{platens}'; use auto, none or [LOW, HIGH]")
     if high - low < MIN_ROWS:
@@ -201,6 +193,17 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
             f"{MIN_ROWS} are needed; give platens: [LOW, HIGH] or none, or check loading_axis"
         )
     return low, high
+
+
+def _warn_of_ends(low: float, high: float, n: int) -> None:
+    """A warning where an image of n rows has no platen at an end."""
+    known = zip(("lower", "upper"), seen((low, high), n), strict=True)
+    if ends := [end for end, has_platen in known if not has_platen]:
+        log.warning(
+            "WARNING: no platen is seen at the %s end of the image along the loading axis, which is "
+            "taken for that of the specimen; crop less if there is one, else say scans.platens: none, "
+            "or [LOW, HIGH]", " and ".join(ends),
+        )  # fmt: skip
 
 
 def _rows_between(volume: NDArray, axis: int, low: float, high: float) -> NDArray:
