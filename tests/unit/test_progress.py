@@ -15,7 +15,7 @@ import pytest
 
 from addvc.runtime import job, told
 from addvc.readable import fault
-from snakemake_logger_plugin_addvc import clock, job_words
+from snakemake_logger_plugin_addvc import clock, job_words, no_target
 
 SOURCE = Path(__file__).parents[2] / "workflow/src"
 SNAKEFILE = """
@@ -88,6 +88,7 @@ def test_what_is_wrong_before_any_job_is_told(snakemake, tmp_path):
     status, said = snakemake("nothing.txt")
     assert status == 1 and "nothing.txt: nothing makes that. A target is `ablation`" in said
     assert "Abaltion: nothing makes that; did you mean ablation?" in snakemake("Abaltion")[1]
+    assert "Fig15: nothing makes that; did you mean fig15?" in snakemake("Fig15")[1]
     (tmp_path / "Snakefile").write_text(
         "from snakemake.exceptions import WorkflowError\nraise WorkflowError('the remedy')\n"
     )
@@ -244,3 +245,8 @@ def test_a_file_that_is_not_yaml_is_told_with_the_line(tmp_path, text, words):
     assert re.search(words, fault(tmp_path / "bad.yaml"))
     (tmp_path / "bad.yaml").write_text("case: a\n")
     assert fault(tmp_path / "bad.yaml") is None
+
+
+def test_what_is_made_for_each_state_is_no_target():
+    words = no_target("Target rules may not contain wildcards. Please specify concrete files")
+    assert words.startswith("What is made for each state") and "give its file" in words

@@ -43,9 +43,15 @@ CONFIGURATION = "Configuration of case "
 """How a message on a fault of the configuration begins (rules/common.smk)."""
 
 STUDIES = ("ablation", "sensitivity")
-"""Targets with a name."""
+"""Targets with a name that are no figures."""
 
-TARGETS = "A target is `ablation`, `sensitivity`, a figure (`fig15`) or a file below results/CASE."
+CAPTIONS = Path(__file__).parents[2] / "report"
+"""Figures and tables have a caption each, by their own name."""
+
+TARGETS = (
+    "A target is `ablation`, `sensitivity`, a figure or table by its name in the report (`fig06`, "
+    "`table2`, `more_bending`) or a file, such as results/CASE/struts_state1.csv."
+)
 """What may stand after `./addvc run`."""
 
 STOPPING = "Terminating processes on user request"
@@ -73,10 +79,13 @@ def fault(message: str) -> str:
 
 def no_target(message: str) -> str:
     """What to say of a target that no rule makes, from Snakemake's message; "" if that is not known."""
+    if "Target rules may not contain wildcards" in message:
+        return "What is made for each state or mesh by itself has no name of its own: give its file."
     found = re.search(r"No rule to produce (\S+)", message)
     if not found:
         return ""
-    close = get_close_matches(found[1].lower(), STUDIES, 1)
+    names = [*STUDIES, *(path.stem for path in CAPTIONS.glob("*.rst"))]
+    close = get_close_matches(found[1].lower(), names, 1)
     return f"{found[1]}: nothing makes that" + (f"; did you mean {close[0]}?" if close else ".")
 
 

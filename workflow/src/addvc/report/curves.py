@@ -26,6 +26,7 @@ def cell_size(case: Case, outputs: Iterable[str]) -> None:
     right.add_patch(Circle(corner, radius, fill=False, color=style.RED, lw=1.2))
     right.text(*corner, "cell size", color=style.RED, fontsize=6, ha="center", va="center")
     style.scale_bar(right, case.voxel_um)
+    style.axis_arrows(right, *np.eye(3)[list(case.specimen.across)])
     style.headline(right, "slab across the loading axis", 1)
     style.save(fig, outputs)
 
@@ -172,7 +173,7 @@ def _steps(ax: Axes, case: Case, name: str, state: int) -> None:
 
 def cutoff(case: Case, outputs: Iterable[str]) -> None:
     """Unbiased risk of each l_E that the default micro method tried, above the least of its state."""
-    fig = style.figure(75, 110)
+    fig, lengths = style.figure(75, 110), set()
     ax = fig.subplots()
     for state in case.states:
         colour = case.colour(state)
@@ -183,11 +184,10 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
         risk = (risk - risk.min()) / (risk.min() or 1.0)
         ax.plot(tried, 100 * risk, "o-", color=colour, ms=4, label=case.title(state, case.micro[0]))
         ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
-    ax.set(xscale="log", xlabel=f"$l_E$ ({style.voxels(case.voxel_um)})")
+        lengths |= set(np.round(tried, 3))
+    ax.set(xscale="log", xlabel=f"$l_E$ that was tried ({style.voxels(case.voxel_um)})")
     ax.set_ylabel("risk above its least (%)")
-    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_formatter("{x:g}")
+    ax.set_xticks(sorted(lengths), [f"{length:.3g}" for length in sorted(lengths)])
     ax.xaxis.set_minor_locator(NullLocator())
     fig.legend(loc="outside lower center", ncols=2)
     style.save(fig, outputs)

@@ -43,13 +43,16 @@ def platen_grid(case: Case, outputs: Iterable[str]) -> None:
     points, faces = whole_foam(volume, case.gamma, specimen, specimen.low, specimen.high)
     edges = _edges(outer_faces(grid)[0])
     layers = [Layer(points, faces), Layer(grid.points, edges, style.BLUE, line_width=5)]
-    picture = render(layers, oblique(specimen.axis), 80, shadows=True)
+    view = oblique(specimen.axis)
+    picture = render(layers, view, 80, shadows=True)
     slice_aspect = volume.shape[specimen.axis] / volume.shape[specimen.across[1]]
     fig, axes = style.panels(1, 2, max(picture.aspect, slice_aspect), spare=15)
     left, right = axes[0]
     picture.show(right)
     _grid_over_slice(left, volume, specimen, grid.points)
     style.scale_bar(left, case.voxel_um)
+    style.axis_arrows(left, *np.eye(3)[[specimen.across[1], specimen.axis]])
+    style.axis_arrows(right, view.right, view.up)
     style.headline(left, "grid over the middle slice", 0)
     cells = f"{len(grid.cells)} hexahedra, {len(grid.points)} nodes"
     style.headline(right, cells, 1)

@@ -209,8 +209,10 @@ def row_name(ax: Axes, name: str) -> None:
 
 def axis_arrows(ax: Axes, right: np.ndarray, up: np.ndarray, y: float = -0.025) -> None:
     """Arrows along x, y and z as they point in a picture with the directions `right` (3,) and `up` (3,),
-    below its right end at `y` over its height; none for an axis that points at the viewer."""
-    below = ax.transAxes + ScaledTranslation(0, -1.2 * ARROW / 72, ax.figure.dpi_scale_trans)
+    below its right end at `y` over its height, its highest name too; none for an axis that points at the
+    viewer."""
+    depth = max(1.2, 1.5 * np.max(up) + 0.4) * ARROW / 72
+    below = ax.transAxes + ScaledTranslation(0, -depth, ax.figure.dpi_scale_trans)
     for name, *along in zip(AXES, right, up, strict=True):
         if np.hypot(*along) < 0.35:
             continue
