@@ -182,6 +182,7 @@ def what_next(summary: dict) -> list[str]:
         return ["List the loaded scans in `scans.states`, and give the same command."]
     name, last = micro_name(summary), summary["states"][-1]["state"]
     return [
+        "- A link to a figure leads to its entry, with its caption: the eye there shows it.",
         "- Is it right? Fig. 13: specks, but no strut of one colour along a flank. Fig. 16: the carried "
         "struts lie in the outline of the image. What is not so is in doubt, above or `valid` 0 in the "
         "files. A small residual alone is no merit: a result with more unknowns follows more noise.",
