@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from addvc.analysis.noise import rms
 from addvc.analysis.strut_energy import KINDS
 from addvc.analysis.strut_table import Measured, mechanics
 from addvc.analysis.struts import Strut
@@ -144,10 +145,6 @@ def correlation(a: np.ndarray, b: np.ndarray) -> float | None:
 def mean(right: np.ndarray) -> float | None:
     """Share of what is right (n,)."""
     return float(np.mean(right)) if len(right) else None
-
-
-def rms(x: np.ndarray) -> float | None:
-    return float(np.sqrt(np.mean(x**2))) if len(x) else None
 
 
 def foam_share(energy: Callable[[str], np.ndarray]) -> float | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.patches import Patch
 
+from addvc.analysis.residuals import by_cell
 from addvc.fem.mesh import outer_faces
 from addvc.fem.operators import strain
 from addvc.report import style
@@ -49,8 +50,7 @@ def _residual_range(case: Case, values: dict) -> style.Normalize:
 def _cell_residual(case: Case, name: str, state: int, cells: int) -> np.ndarray:
     """Weighted mean of r over the Gauss points of each micro cell (m,); 0 outside of the image."""
     r, weight, _ = case.residual(name, state)
-    total = (r * weight).reshape(cells, -1).sum(axis=1)
-    return total / np.maximum(weight.reshape(cells, -1).sum(axis=1), 1e-12)
+    return np.nan_to_num(by_cell(r, weight, weight > 0, cells))
 
 
 def fields(case: Case, outputs: Iterable[str]) -> None:
