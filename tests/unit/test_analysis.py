@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from addvc.analysis.fields import by_owner, result_fields
+from addvc.analysis.fields import by_owner, described, result_fields
 from addvc.analysis.residuals import by_cell, load_residual, residual_on, save_residual
 from addvc.analysis.summary import costs, said, scan_noise
 from addvc.analysis.truth import error_statistics, errors_at, judged_nodes, load_truth
@@ -245,6 +246,20 @@ def test_fields_of_a_uniform_strain_on_the_struts(box):
     np.testing.assert_allclose(cells["residual"], -2)
     doubtful, _ = result_fields(micro, u, micro, residual_of(micro, -2.0), noise=0.4)
     assert not doubtful["valid"].any()
+
+
+def test_a_turn_is_a_small_strain_but_none_of_green_and_lagrange(box):
+    micro = box((0, 0, 0), (4, 6, 5), (4, 6, 5), shake=0.2)
+    turn = Rotation.from_rotvec([0.0, 0.0, np.radians(20)]).as_matrix()
+    u, residual = micro.points @ (turn - np.eye(3)).T, residual_of(micro, 0.0)
+    small, green = (
+        result_fields(micro, u, micro, residual, 1.0, finite=finite)[1]["strain_norm"]
+        for finite in (False, True)
+    )
+    np.testing.assert_allclose(small, np.sqrt(2) * (1 - np.cos(np.radians(20))), rtol=1e-9)
+    np.testing.assert_allclose(green, 0, atol=1e-12)
+    points, cells = result_fields(micro, u, micro, residual, 1.0)
+    assert {*points, *cells, "uncertainty"} == set(described("small")["fields"])
 
 
 def test_torn_cells_have_no_strain_and_their_nodes_no_judgement(box):

@@ -101,6 +101,7 @@ rule field:
     params:
         code=code("analysis/field.py"),
         names=RESULTS,
+        strain=config["fields"]["strain"],
         uncertain=MICRO[0],
     script:
         "../scripts/analysis/field.py"

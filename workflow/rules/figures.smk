@@ -447,6 +447,7 @@ if STATES:
         params:
             code=code("figures/fig15.py"),
             case=FIGURE_CASE,
+            strain=config["fields"]["strain"],
         script:
             "../scripts/figures/fig15.py"
 

@@ -43,7 +43,8 @@ rule series:
         f"{R}/input.json",
         fields=fields(*RESULTS),
     output:
-        expand(f"{R}/fields/{{mesh}}.pvd", mesh=RESULTS),
+        series=expand(f"{R}/fields/{{mesh}}.pvd", mesh=RESULTS),
+        meaning=f"{R}/fields/fields.json",
     log:
         f"{R}/logs/series/all.log",
     benchmark:
@@ -57,6 +58,7 @@ rule series:
     params:
         code=code("report/series.py"),
         states=STATES,
+        strain=config["fields"]["strain"],
     script:
         "../scripts/report/series.py"
 

@@ -16,7 +16,8 @@ with job(snakemake):
         mesh = read_mesh(path)
         u, r = load_field(solution), load_residual(residual)
         torn = load_notes(solution).get("torn_cells", [])
-        on_points, on_cells = result_fields(mesh, u, micro, r, noise, torn)
+        finite = snakemake.params.strain == "green_lagrange"
+        on_points, on_cells = result_fields(mesh, u, micro, r, noise, torn, finite)
         if name == snakemake.params.uncertain:
             on_points["uncertainty"] = load_uncertainty(source.uncertainty)[0]
         write_mesh(result, mesh, on_points, on_cells)

@@ -6,4 +6,4 @@ from addvc.report.maps import fields
 
 with job(snakemake):
     case = Case.of(snakemake.params.case, snakemake.input)
-    fields(case, snakemake.output)
+    fields(case, snakemake.output, snakemake.params.strain)

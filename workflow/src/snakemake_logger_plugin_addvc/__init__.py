@@ -80,7 +80,9 @@ def fault(message: str) -> str:
 def no_target(message: str) -> str:
     """What to say of a target that no rule makes, from Snakemake's message; "" if that is not known."""
     if "Target rules may not contain wildcards" in message:
-        return "What is made for each state or mesh by itself has no name of its own: give its file."
+        return (
+            "What is made for each state or mesh by itself has no name of its own: give its file."
+        )
     found = re.search(r"No rule to produce (\S+)", message)
     if not found:
         return ""

@@ -14,6 +14,11 @@ from addvc.report.case import Case
 from addvc.report.scene import Layer, aspect, facing, oblique, render
 from addvc.report.surfaces import clipped, slab, slab_box
 
+STRAINS = {
+    "small": r"strain $\|\varepsilon\|_F$ (–)",
+    "green_lagrange": "Green-Lagrange strain\n" + r"$\|E\|_F$ (–)",
+}
+
 
 def residual_maps(case: Case, outputs: Iterable[str]) -> None:
     """Fig. 13: mean residual of each micro cell, a row a method, a column a state."""
@@ -53,13 +58,13 @@ def _cell_residual(case: Case, name: str, state: int, cells: int) -> np.ndarray:
     return np.nan_to_num(by_cell(r, weight, weight > 0, cells))
 
 
-def fields(case: Case, outputs: Iterable[str]) -> None:
-    """Fig. 15: u_x, u_y, u_z and the norm of the strain in a slice a cell thick; left the finest
-    meso mesh, right micro DVC."""
+def fields(case: Case, outputs: Iterable[str], kind: str) -> None:
+    """Fig. 15: u_x, u_y, u_z and the norm of the strain, of a `kind` of STRAINS, in a slice a cell
+    thick; left the finest meso mesh, right micro DVC."""
     names, state = (case.finest, case.micro[0]), case.shown_state()
-    slices = [_slice(case, name, state) for name in names]
+    slices = [_slice(case, name, state, kind == "green_lagrange") for name in names]
     labels = [f"$u_{x}$ ({style.voxels(case.voxel_um)})" for x in style.AXES]
-    labels.append(r"strain $\|\varepsilon\|_F$ (–)")
+    labels.append(STRAINS[kind])
     view = facing(case.specimen.axis, slab(case.mesh("micro"), case.specimen.axis, 1)[0])
     fig, axes = style.panels(4, 2, aspect(view, slices[0].points), 11, 18, below=8)
     for d, label in enumerate(labels):
@@ -96,11 +101,11 @@ class Slice:
         return [*found, Layer(self.points, self.faces[self.doubtful], style.DOUBT)]
 
 
-def _slice(case: Case, name: str, state: int) -> Slice:
-    """The slice of Fig. 14."""
+def _slice(case: Case, name: str, state: int, finite: bool) -> Slice:
+    """The slice of Fig. 14, with the small strain or that of Green and Lagrange (`finite`)."""
     mesh, u = case.mesh("micro"), case.displacement(name, state)
     low, high = slab_box(mesh, case.specimen.axis, case.cell_size)
-    norm = np.linalg.norm(strain(mesh, u), axis=(1, 2))
+    norm = np.linalg.norm(strain(mesh, u, finite), axis=(1, 2))
     valid = case.valid(name, state) if name in case.micro else np.ones(len(u))
     points, faces, found = clipped(mesh, low, high, u=u, strain=norm, valid=valid.astype(float))
     doubtful = (found["valid"][faces] < 0.5).any(axis=1)
