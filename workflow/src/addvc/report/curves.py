@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
+from addvc.errors import grey_words
 from addvc.report import style
 from addvc.report.case import Case
 from addvc.report.slices import slab_across
@@ -74,6 +75,7 @@ def histograms(case: Case, outputs: Iterable[str]) -> None:
             loc="upper left", handlelength=0, handletextpad=0, labelcolor="linecolor", fontsize=7
         )
     axes[0].set(ylabel="density (1 / grey level)", xlim=(-reach, reach))
+    axes[0].set_ylim(top=(1 + 0.12 * len(case.states)) * axes[0].get_ylim()[1])  # room for words
     fig.legend(handles=_density_handles(case), loc="outside lower center", ncols=3, fontsize=7)
     style.save(fig, outputs)
 
@@ -84,7 +86,7 @@ def _density_handles(case: Case) -> list:
     if any(case.status(name, n) for name in (case.finest, *case.micro) for n in case.states):
         lines.append(style.line("k", "failed or not converged", "--"))
     if known := _noise_stds(case):
-        lines.append(style.line(style.DARK, f"noise alone, σ = {max(known):.2f}", ":"))
+        lines.append(style.line(style.DARK, f"noise alone, σ = {grey_words(max(known))}", ":"))
     return lines
 
 
@@ -132,7 +134,7 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
         color=case.colour(state),
         ls="--" if wrong else "-",
         lw=1.3,
-        label=f"σ = {stats['std']:.2f}",
+        label=f"σ = {grey_words(stats['std'])}, μ = {stats['mean']:+.2g}, κ = {stats['kurtosis']:.1f}",
     )
 
 
