@@ -19,6 +19,7 @@ from addvc.images.scans_store import save_volume
 from addvc.report import (
     captions,
     curves,
+    judging,
     meso,
     scene,
     starts,
@@ -65,7 +66,7 @@ def folder(tmp_path, cube):
             with h5py.File(path, "w") as file:
                 file["r"] = rng.normal(0, state, 4000).astype(np.float32)
                 file["inside"], file["weight"] = np.ones(4000, bool), rng.random(4000)
-                file.attrs["std"] = float(state)
+                file.attrs.update(std=float(state), mean=0.1, kurtosis=0.2)
     return tmp_path
 
 
@@ -330,6 +331,29 @@ def test_starts_that_were_tried_are_a_row_each(case, folder, cube, tmp_path):
     assert rows[0]["Scale factors along x, y, z (Eq. 6)"] == "1.000 / 0.900 / 1.000"
     assert rows[0]["Score (grey levels²)"] == "–"
     assert rows[2]["Score (grey levels²)"] == "1.250"
+
+
+def test_the_table_of_errors_has_the_junctions_where_there_are_any(case, folder, tmp_path):
+    error = {
+        "rms": 0.0631,
+        "rms_normal": None,
+        "rms_along": None,
+        "p95": 0.105,
+        "within_1_voxel": 1.0,
+    }
+    found = {"count": 21, "within_1": 0.952, "within_2": 1.0, "within_4": None}
+    for state, more in ((1, {"junctions": found}), (2, {})):
+        write_json(folder / f"analysis/error_micro_state{state}.json", error | more)
+    judging.accuracy(case, [tmp_path / "table.csv"], ["micro"])
+    with (tmp_path / "table.csv").open(encoding="utf-8") as file:
+        first, second = csv.DictReader(file)
+    assert (first["rms, voxel"], first["normal, voxel"]) == ("0.063", "unknown")
+    assert [first[key] for key in ("junctions", "within 1 voxel", "4 voxels")] == [
+        "21",
+        "95.2%",
+        "unknown",
+    ]
+    assert (second["State"], second["junctions"]) == ("5.2 %", "unknown")
 
 
 def test_acquisition_has_units_in_its_header(case, folder, tmp_path):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth, save_mesh_truth
-from addvc.analysis.truth import check_truth, errors_at, load_truth
+from addvc.analysis.truth import check_truth, errors_at, junction_accuracy, load_truth
 from addvc.errors import ConfigError, MeshError
 from addvc.fem.elements import P2_EDGES, tet_p1, tet_p2
 from addvc.fem.mesh import Mesh
@@ -114,6 +114,18 @@ def test_errors_are_split_along_and_across_struts(cross):
     assert found["rms"] == pytest.approx(0.5)
     assert found["rms_along"] == pytest.approx(0.3, abs=0.05)
     assert found["rms_normal"] == pytest.approx(0.4, abs=0.05)
+
+
+def test_a_junction_is_as_far_off_as_its_nodes_are_on_the_mean(cross, rng):
+    """One junction, in the middle: noise of its nodes averages out, what they share does not."""
+    points = rng.uniform(-1, 1, (500, 3))
+    for shift, shares in ((0.8, [1, 1, 1]), (1.5, [0, 1, 1]), (3.0, [0, 0, 1])):
+        u = rng.normal([0, shift, 0], 0.5, (500, 3))
+        (found,) = errors_at(cross, points, [u], 1)
+        assert found["junctions"]["count"] == 1
+        assert [found["junctions"][f"within_{limit}"] for limit in (1, 2, 4)] == shares
+    far = junction_accuracy(cross.junctions, points + 9, u)
+    assert far == {"count": 0, "within_1": None, "within_2": None, "within_4": None}
 
 
 def test_a_solid_without_struts_has_one_axis_everywhere_and_no_strut_is_lost(block):

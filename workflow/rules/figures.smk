@@ -729,8 +729,18 @@ if STATES and HAS_TRUTH:
                 state=STATES,
             ),
         output:
-            shown("more_error.png", "more_error", "Quality", "error against the truth"),
-            drawing("more_error"),
+            table=shown(
+                "more_error.csv", "more_error", "Tables", "errors against the truth"
+            ),
+            pictures=[
+                shown(
+                    "more_error.png",
+                    "more_error",
+                    "Quality",
+                    "error against the truth",
+                ),
+                drawing("more_error"),
+            ],
         log:
             f"{R}/logs/figures/more_error.log",
         benchmark:

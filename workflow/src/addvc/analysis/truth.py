@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from addvc.analysis.mesh_truth import MeshTruth, is_mesh_truth
 from addvc.errors import ConfigError, MeshError
@@ -12,6 +13,9 @@ from addvc.twin.truth import Truth
 from addvc.twin.virtual import VirtualField
 
 log = logging.getLogger(__name__)
+
+BODY = 2.0
+"""Voxels around a junction whose nodes move with it: some 1.5 radii of a strut."""
 
 AWAY, FEW = 2.0, 0.05
 """Voxels that a truth can be extrapolated by; the share of nodes that may be farther."""
@@ -93,14 +97,33 @@ def error_statistics(error: np.ndarray, tangent: np.ndarray | None) -> dict:
     }
 
 
+def junction_accuracy(
+    junctions: np.ndarray, points: np.ndarray, error: np.ndarray
+) -> dict[str, float | int | None]:
+    """How many junctions (j, 3) have points (n, 3) within BODY voxels, and the shares of these whose
+    mean error vector, of (n, 3), is below 1, 2 and 4 voxels; None where there is none."""
+    tree = cKDTree(points)
+    near = tree.query_ball_point(junctions, BODY) if len(junctions) else []
+    off = np.array([np.linalg.norm(error[nodes].mean(axis=0)) for nodes in near if nodes])
+    shares = {
+        f"within_{limit}": float(np.mean(off < limit)) if len(off) else None for limit in (1, 2, 4)
+    }
+    return {"count": len(off)} | shares
+
+
 def errors_at(
     truth: Judge, points: np.ndarray, fields: Iterable[np.ndarray], state: int
 ) -> list[dict]:
-    """Error statistics of each u (n, 3) of `fields`, measured at points (n, 3) of the reference. Raises
-    MeshError where the truth is not there."""
-    tangent = None
-    if not isinstance(truth, VirtualField):
-        _, tangent, distance = truth.strut(points)
-        check_near(distance)
+    """Error statistics of each u (n, 3) of `fields`, measured at points (n, 3) of the reference, with
+    the accuracy of junctions where the truth has struts. Raises MeshError where the truth is not
+    there."""
     true = truth.displacement(points, state)
-    return [error_statistics(u - true, tangent) for u in fields]
+    if isinstance(truth, VirtualField):
+        return [error_statistics(u - true, None) for u in fields]
+    _, tangent, distance = truth.strut(points)
+    check_near(distance)
+    return [
+        error_statistics(u - true, tangent)
+        | {"junctions": junction_accuracy(truth.junctions, points, u - true)}
+        for u in fields
+    ]

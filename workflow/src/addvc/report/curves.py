@@ -134,8 +134,14 @@ def _density(ax: Axes, case: Case, name: str, state: int, reach: float) -> None:
         color=case.colour(state),
         ls="--" if wrong else "-",
         lw=1.3,
-        label=f"σ = {grey_words(stats['std'])}, μ = {stats['mean']:+.2g}, κ = {stats['kurtosis']:.1f}",
+        label=_moments(stats),
     )
+
+
+def _moments(stats: dict) -> str:
+    """Standard deviation, mean and excess kurtosis of the residual in words."""
+    mean, tail = f"{stats['mean']:+.2g}", f"{stats['kurtosis']:.1f}"
+    return f"σ = {grey_words(stats['std'])}, μ = {mean}, κ = {tail}".replace("-", "−")
 
 
 def convergence(case: Case, outputs: Iterable[str], tolerance: dict[str, float]) -> None:

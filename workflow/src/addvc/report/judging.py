@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from addvc.errors import grey_words
 from addvc.report.case import Case
+from addvc.report.page_tables import figure
 from addvc.report.tables import write_tables
 
 
@@ -25,6 +26,26 @@ def difficulty(case: Case, outputs: Iterable[str]) -> None:
         if "rotation" in first:
             values = (f"{s['rotation'][key]:.1f}" for s in states)
             rows.append([f"Rotation of the struts, {name}", "degree", *values])
+    write_tables(outputs, rows)
+
+
+def accuracy(case: Case, outputs: Iterable[str], names: Iterable[str]) -> None:
+    """Errors of each result in each state at the nodes, and the shares of junctions within 1, 2 and 4
+    voxels, where the truth has any."""
+    head = ["State", "Result", "rms, voxel", "normal, voxel", "along, voxel", "95th percentile, voxel",
+            "nodes within 1 voxel", "junctions", "within 1 voxel", "2 voxels", "4 voxels"]  # fmt: skip
+    rows = [head]
+    for state in case.states:
+        for name in names:
+            error = case.json(f"analysis/error_{name}_state{state}.json")
+            found = error.get("junctions") or {}
+            lengths = (error[key] for key in ("rms", "rms_normal", "rms_along", "p95"))
+            shares = (found.get(f"within_{limit}") for limit in (1, 2, 4))
+            rows.append([
+                case.labels[state], name, *(figure(x, ".3f") for x in lengths),
+                figure(error["within_1_voxel"], ".2%"), found.get("count", "unknown"),
+                *(figure(x, ".1%") for x in shares),
+            ])  # fmt: skip
     write_tables(outputs, rows)
 
 
