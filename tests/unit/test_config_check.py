@@ -127,6 +127,10 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
             "low = 80 to high = 40; low must be below",
         ),
         (
+            {"micro": {"region": {"low": 20, "height": 40}}},
+            "has a height, whose place meso DVC finds, and low or high",
+        ),
+        (
             {"meso": {"candidates": ["previous"]}},
             "at least one of zero, platens, freeform",
         ),

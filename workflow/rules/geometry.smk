@@ -56,6 +56,11 @@ rule solid:
         reference=(
             f"{R}/volumes/volume0.h5" if config["mesh"]["mend"] == "bridge" else []
         ),
+        profile=(
+            f"{R}/geometry/meso_residual.json"
+            if "height" in config["micro"]["region"]
+            else []
+        ),
     output:
         solid=f"{R}/geometry/solid.h5",
         region=f"{R}/geometry/region.json",

@@ -133,6 +133,32 @@ rule meso_dvc:
         "../scripts/meso/meso_dvc.py"
 
 
+rule meso_profile:
+    input:
+        mesh=f"{R}/geometry/{FINEST}.vtu",
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/smooth0.h5",
+        deformed=expand(f"{R}/volumes/smooth{{state}}.h5", state=STATES),
+        solutions=expand(f"{R}/dvc/{FINEST}_state{{state}}.h5", state=STATES),
+    output:
+        f"{R}/geometry/meso_residual.json",
+    log:
+        f"{R}/logs/meso_profile/all.log",
+    benchmark:
+        f"{R}/benchmarks/meso_profile/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1000, 12.0),
+        runtime=20,
+    params:
+        code=code("meso/meso_profile.py"),
+        axis=AXIS,
+    script:
+        "../scripts/meso/meso_profile.py"
+
+
 rule meso_ultimate_error:
     input:
         **({"solution": f"{R}/dvc/{{meso}}_state{STATES[0]}.h5"} if STATES else {}),

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 from addvc.runtime import job
 from addvc.geometry.bridges import bridged
-from addvc.geometry.region import micro_region
+from addvc.geometry.region import micro_region, worst_slab
 from addvc.geometry.surface import region_solid
 from addvc.images.files import read_json, write_json
 from addvc.images.scans import load_volume, save_volume
@@ -14,6 +14,8 @@ with job(snakemake):
     smooth, _ = load_volume(snakemake.input.smooth)
     specimen = Specimen.from_dict(read_json(snakemake.input.specimen))
     setting, sides = snakemake.params.micro["region"], snakemake.params.sides
+    if snakemake.input.profile:
+        setting = worst_slab(specimen, setting, **read_json(snakemake.input.profile))
     region = micro_region(specimen, setting, sides=sides)
     levels = read_json(snakemake.input.threshold)
     mesh, bridges = snakemake.params.mesh, []

@@ -77,13 +77,23 @@ def check_porosity(config: dict) -> None:
 
 
 def check_region(config: dict) -> None:
-    """ConfigError where a slab of `micro.region` ends before it begins."""
+    """ConfigError where a slab of `micro.region` ends before it begins, or is given and to be found."""
     region = config.get("micro", {}).get("region", "all")
     wanted = {} if region == "all" else region
     low, high = wanted.get("low"), wanted.get("high")
     if low is not None and high is not None and low >= high:
         raise ConfigError(
             f"micro.region goes from low = {low:g} to high = {high:g}; low must be below high: swap them"
+        )
+    if "height" in wanted and {"low", "high"} & set(wanted):
+        raise ConfigError(
+            "micro.region has a height, whose place meso DVC finds, and low or high, which give one; "
+            "leave out either"
+        )
+    if "height" in wanted and not settings.state_strains(config):
+        raise ConfigError(
+            "micro.region has a height, whose place the residual of meso DVC finds, and there are 0 "
+            "loading states (at least 1); add scans.states, or give low and high"
         )
 
 

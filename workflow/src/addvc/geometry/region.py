@@ -57,6 +57,24 @@ def micro_region(specimen: Specimen, setting, margin: float = 3.0, sides: str = 
     return Region(specimen.axis, low, high, tuple(specimen.centre), radius, cut_sides=cut)
 
 
+def worst_slab(
+    specimen: Specimen, setting: dict, square: list, count: list, margin: float = 3.0, **_
+) -> dict:
+    """`micro.region` {height, radius} as {low, high, radius}: of the slabs of this height (voxels) that
+    where meso DVC leaves the largest mean of r^2.
+
+    square, count: sum of r^2 and number of points in each plane of voxels across the loading axis."""
+    low, high = specimen.low + margin, specimen.high - margin
+    height = min(float(setting["height"]), high - low)
+    sums = [np.concatenate([[0.0], np.cumsum(values)]) for values in (square, count)]
+    edges = np.arange(len(sums[0])) - 0.5  # of the planes
+    starts = np.arange(low, high - height + 1e-9, 0.5)
+    inside = [np.interp(starts + height, edges, s) - np.interp(starts, edges, s) for s in sums]
+    first = float(starts[np.argmax(inside[0] / np.maximum(inside[1], 1.0))])
+    rest = {key: value for key, value in setting.items() if key != "height"}
+    return rest | {"low": first, "high": first + height}
+
+
 def caps_depth(region: Region, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Depth (n,) of points (n, 3) below the two end caps, and below the sides; negative outside."""
     along = points[..., region.axis]
