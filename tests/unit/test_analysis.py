@@ -354,4 +354,5 @@ def test_warnings_of_jobs_are_collected(tmp_path):
                        ("meso_dvc/state2.log", log.format(2))):  # fmt: skip
         (tmp_path / path).parent.mkdir(exist_ok=True)
         (tmp_path / path).write_text(text)
-    assert said(tmp_path, [1, 2]) == ["smooth 2: this scan has void of 47"]
+    assert said(tmp_path, [1, 2], []) == ["smooth 2: this scan has void of 47"]
+    assert said(tmp_path, [1, 2], ["smooth"]) == []

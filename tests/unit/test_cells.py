@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from addvc.analysis.cell_strain import cell_strain, columns, described, window
 from addvc.analysis.localisation import LEAST_STRAIN, compared, localisation
 from addvc.fem.mesh import cell_volumes, nodal_volumes
-from addvc.report.cells import across, grid_of, profile
+from addvc.report.cells import across, draw_map, grid_of, profile
 
 CELL = 10.0
 EVERY = np.array([[-0.12, 0.03, 0.01], [0.02, -0.21, 0.05], [0.0, -0.04, 0.02]])
@@ -149,6 +150,17 @@ def test_the_last_layer_of_points_is_no_band():
     strain[:, :2] = -0.2
     band = localisation(points, strain, 1, CELL)
     assert band["bands"] == 0 and band["normal"] is None and band["volume_share"] > 0.04
+
+
+def test_a_slab_too_thin_for_a_cell_says_so():
+    """One layer of points, nothing known: a map with a height, and words."""
+    points, strain, _ = slab(0, 8.0)
+    nothing = localisation(points[:, :1], np.full_like(strain[:, :1], np.nan), 1, CELL)
+    assert nothing["mean_strain"] is None and nothing["points"] == 0
+    ax = Figure().add_subplot()
+    draw_map(ax, np.full((1, 14), np.nan), np.arange(14.0), np.array([5.0]))
+    assert ax.get_ylim() == (4.0, 6.0)
+    assert "thinner than a cell" in ax.texts[0].get_text()
 
 
 def test_a_lump_is_not_flat():

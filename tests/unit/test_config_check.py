@@ -1,5 +1,7 @@
 """Every fault of a configuration is told at once, with its key, value, limit and remedy."""
 
+import math
+
 import pytest
 import yaml
 
@@ -104,6 +106,11 @@ def test_a_key_like_no_other_gets_the_list_of_those_known():
         (
             {"geometry": {"threshold": float("nan")}},
             "`geometry.threshold` is nan; give a finite number",
+        ),
+        (scans(platens=[math.nan, 10]), r"`scans.platens.0` is nan; give a finite number"),
+        (
+            {"meso": {"sizes": [12.00000001, 12.0]}},
+            "must fall from coarse to fine, and differ in six digits",
         ),
         (scans(states=[]) | {"virtual": {"strains": [2]}}, r"at most 0.3 \(did you mean 0.02\?\)"),
         ({"axes": "xyz"}, "unknown key `axes`: did you mean `scans.axes`?"),

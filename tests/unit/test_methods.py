@@ -76,6 +76,28 @@ def test_what_was_put_into_the_mesh_and_what_was_left_out_is_told():
     assert "of a part" not in told(config()) and "put in" not in told(config())
 
 
+def test_what_made_the_scans_and_what_was_left_of_them_is_told():
+    assert "are synthetic, of a network of beams" in told(config())
+    given = {"case": "foam", "porosity": 0.96, "virtual": {"strains": [0.02]},
+             "scans": {"reference": "a.tif", "voxel_size_um": 9, "crop": [[0, 50], None, None]}}  # fmt: skip
+    validate(given, str(ROOT / "workflow/schemas/config.schema.yaml"))
+    scans = SCANS | {"scans": [SCANS["scans"][0] | {"binned_shape": [16, 46, 40]}]}
+    text = "\n".join(methods(summary(state(1)), given, scans))
+    assert "deformed by a known field on the computer" in text
+    assert "120 x 140 x 120 voxels of 6.67 micrometres, of which 16 x 46 x 40 were kept" in text
+
+
+def test_nothing_is_said_of_what_was_not_done():
+    settings = config()
+    settings["images"]["blur"] = 0
+    flat = [state(1) | {"meso12": {"l_l": 0.0}}]
+    assert "blurred" not in told(settings) and "Laplacian below 0" not in told(settings, *flat)
+    one = summary(state(1))
+    del one["meshes"]["meso33"]
+    text = "\n".join(methods(one, config(), SCANS))
+    assert "finer meshes" not in text and "and micro DVC started" not in text
+
+
 def test_the_numbers_are_those_of_the_summary():
     text = told(config(), state(1, error={"median": 0.076}), state(2, error={"median": 0.113}))
     for words in ("commit ab12", "(3, of 120 x 140 x 120 voxels of 6.67 micrometres, binned by 3",

@@ -513,3 +513,30 @@ def test_grey_levels_of_any_unit_are_told(value, words):
 
 def test_an_unknown_grey_level_is_told_as_such():
     assert grey_words(None) == "unknown"
+
+
+def test_a_page_is_made_where_figures_are_unknown():
+    """nan is null in a file: no table and no sentence stumbles over one."""
+    none = dict.fromkeys(ERROR)
+    lost = state(1, "flagged", error=none) | {"uncertainty": {"rms": None}}
+    lost["micro"] |= {"residual_std": None, "residual_mean": None, "last_step": None}
+    assert "unknown" in front_page(summary(lost), CONFIG, SCANS)
+    assert "median unknown" in closing_lines(summary(lost), "results/foam")
+
+
+def test_small_grey_levels_are_not_rounded_to_nothing():
+    small = copy.deepcopy(GOOD) | {"noise_std": 3.5e-4}
+    small["micro"]["residual_std"] = 4.1e-4
+    page = front_page(summary(small), CONFIG, SCANS)
+    assert "0.00041" in page and "0.00035" in page
+
+
+def test_a_gap_that_opens_is_an_extension_by_the_platens_too():
+    pulled = GOOD | {
+        "strain": -0.02,
+        "label": "state 1",
+        "platens": {"strain": -0.021, "apart": 0.0},
+    }
+    assert state_words(pulled) == "1 (2.0% extension measured, 2.1% by the platens)"
+    odd = pulled | {"platens": {"strain": 0.01, "apart": 0.0}}
+    assert state_words(odd) == "1 (2.0% extension measured, 1.0% by the platens)"

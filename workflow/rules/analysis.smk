@@ -43,7 +43,7 @@ rule image_noise:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(1000, 10.0),
+        mem_mb=memory_by_largest(1000, 20.0),
         runtime=10,
     params:
         code=code("analysis/image_noise.py"),
@@ -68,7 +68,7 @@ rule platen_faces:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(800, 6.0),
+        mem_mb=memory_by_largest(800, 10.0),
         runtime=10,
     params:
         code=code("analysis/platen_faces.py"),
@@ -487,6 +487,15 @@ APART = [
 ]
 
 
+# What has no part in this configuration: an earlier one may have left its cost and its warnings.
+UNUSED = [
+    *([] if FREEFORM else ["freeform"]),
+    *([] if EQUILIBRIUM else ["strut_frame"]),
+    *([] if HAS_TRUTH else ["truth_error"]),
+    *([] if "height" in config["micro"]["region"] else ["meso_profile"]),
+]
+
+
 rule summary:
     input:
         f"{R}/input.json",
@@ -549,14 +558,14 @@ rule summary:
         scope={
             "meshes": [*MESO, *MICRO],
             "methods": METHODS,
-            "region": config["micro"]["region"],
+            "region": config["micro"]["region"] or "all",
             "finest": FINEST,
             "axis": AXIS,
             "truth": HAS_TRUTH,
             "freeform": bool(FREEFORM),
             "blur": config["images"]["blur"],
             "bin": settings.scan_settings(config, 0)["bin"],
-            "apart": APART,
+            "apart": [*APART, *UNUSED],
         },
     script:
         "../scripts/analysis/summary.py"

@@ -123,6 +123,13 @@ def memory(least, per_input=3.0):
     )
 
 
+def memory_by_largest(least, per_file):
+    """The same by the largest input: of jobs that hold few of their images at a time."""
+    return lambda wildcards, input, attempt: int(
+        attempt * max(least, 600, per_file * max(input.size_files_mb, default=0))
+    )
+
+
 def own_scan(state):
     """Whether the scan of a state is made by the workflow."""
     return KIND == "twin" or (KIND == "virtual" and state > 0)

@@ -16,7 +16,7 @@ rule fig03:
         ENV
     threads: 1
     resources:
-        mem_mb=memory(2000, 12.0),
+        mem_mb=memory_by_largest(2000, 24.0),
         runtime=15,
     params:
         code=code("figures/fig03.py"),
@@ -471,7 +471,7 @@ if STATES:
             ENV
         threads: 1
         resources:
-            mem_mb=memory(2000, 10.0),
+            mem_mb=memory_by_largest(2000, 24.0),
             runtime=15,
         params:
             code=code("figures/fig16.py"),
@@ -494,7 +494,7 @@ if STATES:
             ENV
         threads: 1
         resources:
-            mem_mb=memory(2000, 10.0),
+            mem_mb=memory_by_largest(2000, 24.0),
             runtime=15,
         params:
             code=code("figures/fig17.py"),

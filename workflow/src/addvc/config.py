@@ -158,9 +158,12 @@ def meso_names(config: dict) -> list[str]:
 
     Raises ConfigError where meso.sizes do not fall, or one is given twice."""
     sizes = config["meso"].get("sizes", NOMINAL_SIZES)
-    if sorted(sizes, reverse=True) != list(sizes) or len(set(sizes)) != len(sizes):
-        raise ConfigError(f"meso.sizes {sizes} must fall from coarse to fine")
-    return [f"meso{size:g}" for size in sizes]
+    names = [f"meso{size:g}" for size in sizes]
+    if sorted(sizes, reverse=True) != list(sizes) or len(set(names)) != len(names):
+        raise ConfigError(
+            f"meso.sizes {sizes} must fall from coarse to fine, and differ in six digits"
+        )
+    return names
 
 
 def meso_size(config: dict, name: str, cell_size: float) -> float:

@@ -98,10 +98,12 @@ def check_region(config: dict) -> None:
 
 
 def check_finite(config: dict, path: str = "") -> None:
-    """ConfigError for nan and infinity, which pass every limit."""
+    """ConfigError for nan and infinity, in lists too, which pass every limit."""
     for key, value in config.items():
         if isinstance(value, dict):
             check_finite(value, f"{path}{key}.")
+        elif isinstance(value, list):
+            check_finite(dict(enumerate(value)), f"{path}{key}.")
         elif isinstance(value, float) and not math.isfinite(value):
             raise ConfigError(f"`{path}{key}` is {value}; give a finite number")
 

@@ -47,10 +47,12 @@ def refuse(faults: Iterable[str], kind: type[AddvcError], what: str = "") -> Non
         raise kind(f"{len(different)} things are wrong{what}:{lines}")
 
 
-def grey_words(value: float | None) -> str:
-    """A grey level in words: to a tenth, to a hundredth below 10, with three digits where it is as small
-    as an attenuation; "unknown" for None."""
+def grey_words(value: float | None, places: int = 2) -> str:
+    """A grey level in words: to a tenth, with some decimal places below 10, with three digits where it
+    is as small as an attenuation; "unknown" for None."""
     if value is None:
         return "unknown"
     size = abs(value)
-    return f"{value:.1f}" if size >= 10 else f"{value:.2f}" if size >= 0.1 else f"{value:.3g}"
+    return (
+        f"{value:.1f}" if size >= 10 else f"{value:.{places}f}" if size >= 0.1 else f"{value:.3g}"
+    )

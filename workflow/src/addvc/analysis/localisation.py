@@ -46,10 +46,10 @@ def localisation(points: np.ndarray, strain: np.ndarray, axis: int, cell_size: f
     """What MEANING lists, of the strain (nx, ny, nz) along the axis at the points (nx, ny, nz, 3) of a
     grid, nan where unknown; None where there is no band. Cell size in voxels."""
     known = np.isfinite(strain)
-    mean = float(strain[known].mean()) if known.any() else 0.0
+    mean = float(strain[known].mean()) if known.any() else None
     figures = dict.fromkeys(MEANING) | {"points": int(known.sum()), "mean_strain": mean}
     figures["factor"] = FACTOR
-    if abs(mean) < LEAST_STRAIN:
+    if mean is None or abs(mean) < LEAST_STRAIN:
         return figures
     ratio = np.where(known, strain / mean, -np.inf)
     inside = ratio > FACTOR

@@ -46,8 +46,8 @@ WARNED = re.compile(r"^\S+ \[([^]]+)\] WARNING: (.+)$", re.MULTILINE)
 class Scope:
     """What there is to sum up: results from meso to micro, the method of each of the latter, the finest
     meso mesh, the loading axis, `micro.region`, whether there is a truth and a free-form start, the
-    pre-filter (voxels) and the binning of scans, rules whose cost does not count since they may run
-    before or after."""
+    pre-filter (voxels) and the binning of scans, rules whose cost does not count, and whose warnings,
+    since they may run before or after, or are no part of this configuration."""
 
     meshes: list[str]
     methods: dict[str, str]
@@ -82,19 +82,19 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
             {"state": state, "label": label} | state_figures(folder, state, scope)
             for state, label in states.items()
         ],
-        "said": said(folder / "logs", states),
+        "said": said(folder / "logs", states, scope.apart),
         "cost": costs(folder / "benchmarks", scope.apart, states, scope.meshes),
         "versions": {"addvc": __version__, "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
     }
 
 
-def said(folder: Path, states: Iterable[int]) -> list[str]:
+def said(folder: Path, states: Iterable[int], apart: Sequence[str]) -> list[str]:
     """What jobs of the rules SPEAKING have warned of, as their logs have it: "smooth 2: ..."; not what
-    earlier configurations have left, of other states."""
+    earlier configurations have left, of other states or of rules `apart`."""
     known = {"all", *(f"state{state}" for state in (0, *states))}
     found = []
-    for rule in SPEAKING:
+    for rule in (rule for rule in SPEAKING if rule not in apart):
         for path in sorted(folder.glob(f"{rule}/*.log")):
             if path.stem in known:
                 found += WARNED.findall(path.read_text())

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from addvc.analysis.localisation import FACTOR, LUMP
 from addvc.analysis.strut_store import read_columns
 from addvc.report import style
-from addvc.report.case import Case
+from addvc.report.case import PICTURED, Case
 
 RANGE = Normalize(0, 2.5)
 """Of the strain over its mean."""
@@ -63,7 +63,8 @@ def maps(fig: Figure, case: Case, grids: dict, figures: dict, way: tuple[int, in
     for ax in axes[len(grids) :]:
         ax.set_axis_off()
     for number, (ax, (state, (lines, strain))) in enumerate(zip(axes, grids.items(), strict=False)):
-        ratio = strain / (np.nanmean(strain) or np.nan)
+        known = strain[np.isfinite(strain)]
+        ratio = strain / (known.mean() if known.any() else np.nan)
         part = np.take(ratio, len(lines[normal]) // 2, axis=normal)
         part = part if axis < flat else part.T  # rows along the loading axis
         draw_map(ax, part, lines[flat], lines[axis])
@@ -79,11 +80,20 @@ def maps(fig: Figure, case: Case, grids: dict, figures: dict, way: tuple[int, in
 def draw_map(ax: Axes, part: np.ndarray, right: np.ndarray, up: np.ndarray) -> None:
     """Values (rows, columns) at these places (voxels), grey where unknown, and where a band begins."""
     ax.set_facecolor("#dcdcdc")
-    ax.pcolormesh(right, up, part, norm=RANGE, cmap=style.MAGNITUDE, shading="nearest",
-                  rasterized=True)  # fmt: skip
+    ax.pcolormesh(edges(right), edges(up), part, norm=RANGE, cmap=style.MAGNITUDE, rasterized=True)
+    if not np.isfinite(part).any():
+        style.note(
+            ax, "no strain of cells:\nthinner than a cell", 0.5, 0.5, ha="center", va="center"
+        )
     if min(part.shape) > 1 and (part > FACTOR).any():
         ax.contour(right, up, part, [FACTOR], colors=BAND, linewidths=1.2)
     ax.set_aspect("equal")
+
+
+def edges(middles: np.ndarray) -> np.ndarray:
+    """Edges (n + 1,) of cells around equally spaced middles (n,); of one alone, two voxels wide."""
+    step = middles[1] - middles[0] if len(middles) > 1 else 2.0
+    return np.append(middles - step / 2, middles[-1] + step / 2)
 
 
 def band_line(ax: Axes, band: dict, way: tuple[int, int, int], lines: list[np.ndarray]) -> None:
@@ -132,7 +142,7 @@ def profiles(ax: Axes, case: Case, grids: dict, truth: bool) -> None:
         *ax.get_legend_handles_labels()[0],
         *([style.line("k", "truth", "--")] if truth else []),
     ]
-    ax.legend(handles=handles, fontsize=7)
+    ax.legend(handles=handles, fontsize=7, ncols=1 + len(grids) // (PICTURED + 1))
 
 
 def profile(lines: list[np.ndarray], strain: np.ndarray, axis: int) -> tuple:
@@ -155,6 +165,7 @@ def shares(ax: Axes, case: Case, figures: dict, truth: bool) -> None:
             y = [100 * (f[key] or 0) for f in true]
             ax.plot(x, y, "o", color=style.DARK, ms=4, label="truth" if shift > 0 else None)
     ax.set(xticks=range(len(figures)), xlabel="loading state", ylabel="share in bands (%)")
-    ax.set_xticklabels([case.labels[n] for n in figures])
+    many = len(figures) > PICTURED
+    ax.set_xticklabels([n if many else case.labels[n] for n in figures])
     ax.set_ylim(top=1.35 * ax.get_ylim()[1])
     ax.legend(fontsize=7, loc="upper left")

@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocato
 
 from addvc.errors import grey_words
 from addvc.report import style
-from addvc.report.case import Case
+from addvc.report.case import PICTURED, Case
 from addvc.report.slices import slab_across
 
 
@@ -235,7 +235,8 @@ def _error_panels(case: Case, names: Sequence[str]) -> tuple:
     for number, (ax, text) in enumerate(zip(axes, titles, strict=False)):
         style.headline(ax, text, number)
         ax.set(yscale="log", xticks=range(len(case.states)), xlabel="loading state")
-        titles = [style.narrow(case.title(n, case.micro[0])) for n in case.states]
+        many = len(case.states) > PICTURED
+        titles = [n if many else style.narrow(case.title(n, case.micro[0])) for n in case.states]
         ax.set_xticklabels(titles, fontsize=7)
         ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ax.yaxis.set_major_formatter("{x:g}")

@@ -55,5 +55,6 @@ def twin_check(case: Case, outputs: Iterable[str]) -> None:
     for check in case.json("analysis/twin_check.json")["checks"]:
         low, high = ("–" if x is None else f"{x:.4g}" for x in (check["low"], check["high"]))
         holds = "yes" if check["passed"] else "NO"
-        rows.append([check["name"], f"{check['value']:.4g}", check["unit"], low, high, holds])
+        value = figure(check["value"], ".4g")
+        rows.append([check["name"], value, check["unit"], low, high, holds])
     write_tables(outputs, rows)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from addvc.config import METHODS, chooses, loading_axis, micro_names
+from addvc.config import METHODS, case_kind, chooses, loading_axis, micro_names, scan_settings
 from addvc.correlation.micro import MicroOptions, micro_options, turns
 from addvc.errors import grey_words
 from addvc.report import style
@@ -38,6 +38,13 @@ GREY = {
 }
 """What was done to the scans before the blur, by `images.grey`."""
 
+MADE = {
+    "twin": "are synthetic, of a network of beams in equilibrium (the twin of addvc); they ",
+    "virtual": "are the first of them, and this deformed by a known field on the computer; they ",
+    "scans": "",
+}
+"""What scans are that no tomograph made."""
+
 
 def listing(words: list[str], last: str = "and") -> str:
     """a, b and c."""
@@ -53,21 +60,31 @@ def span(values: list[float], form: str | Callable[[float], str]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def scans_words(summary: dict, config: dict, scans: dict) -> str:
+    """How many scans there are, of what size, what was done to it, and who made them."""
+    first, factor, size = scans["scans"][0], scans["bin"], summary["voxel_size_um"]
+    told = [
+        f"The scans ({len(summary['states']) + 1}, of {' x '.join(map(str, first['shape']))} voxels of "
+        f"{size / factor:g} micrometres"
+    ]
+    if scan_settings(config, 0)["crop"]:
+        told.append(f"of which {' x '.join(map(str, first['binned_shape']))} were kept in the end")
+    if factor > 1:
+        told.append(f"binned by {factor} to voxels of {size:g} micrometres")
+    return f"{', '.join(told)}) {MADE[case_kind(config)]}were"
+
+
 def images(summary: dict, config: dict, scans: dict) -> str:
     """What was scanned, and how the images are read."""
-    first, versions = scans["scans"][0], summary["versions"]
-    size = " x ".join(map(str, first["shape"]))
-    factor, geometry = scans["bin"], config["geometry"]
-    binned = f", binned by {factor} to voxels of {summary['voxel_size_um']:g} micrometres"
+    versions, geometry, settings = summary["versions"], config["geometry"], config["images"]
+    blur = f"blurred by a Gaussian of {settings['blur']:g} voxel and " if settings["blur"] else ""
     cell = "read from the autocorrelation of the reference, "
     level = f"which leaves a porosity of {summary['porosity']:.3f}, "
     return (
         "Displacement was measured by architecture-driven digital volume correlation {addvc} {addict} "
-        f"with addvc {versions['addvc']} (commit {versions['commit']}), a Snakemake "
-        f"workflow {{snakemake}}. The scans ({len(summary['states']) + 1}, of {size} voxels of "
-        f"{summary['voxel_size_um'] / factor:g} micrometres{binned if factor > 1 else ''}) were "
-        f"{GREY[config['images']['grey']]}blurred by a Gaussian of {config['images']['blur']:g} voxel "
-        f"and evaluated between voxels by B-splines of degree {config['images']['degree']} "
+        f"with addvc {versions['addvc']} (commit {versions['commit']}), a Snakemake workflow "
+        f"{{snakemake}}. {scans_words(summary, config, scans)} {GREY[settings['grey']]}{blur}"
+        f"evaluated between voxels by B-splines of degree {settings['degree']} "
         "{spline}; lengths are in these voxels. The cell size, "
         f"{cell if geometry['cell_size'] == 'auto' else ''}is {summary['cell_size']:.1f} "
         "voxels; the threshold between void and solid, "
@@ -87,12 +104,13 @@ def meso(summary: dict, config: dict) -> str:
     used = [state[name]["l_l"] for state in summary["states"] for name in finer(summary)]
     auto = config["meso"]["l_l"] == "auto"
     chosen = ", the length of least unbiased risk {stein} in each state" if auto else ""
-    laplacian = f", with a Laplacian below {span(used, '.3g')} voxels{chosen}" if used else ""
+    laplacian = f", with a Laplacian below {span(used, '.3g')} voxels{chosen}" if any(used) else ""
+    on = f"finer meshes{laplacian}, and micro DVC" if finer(summary) else "micro DVC"
     return (
         "Each loading state was registered with the reference by finite-element DVC {dvc} on "
         f"tetrahedra with a mean edge of {edges} voxels, coarse to fine{clear}, from the start of least "
-        f"residual: {starts}, each rescaled in a reduced basis on the coarsest mesh {{addvc}}; finer "
-        f"meshes{laplacian}, and micro DVC started from the coarser result{fields}."
+        f"residual: {starts}, each rescaled in a reduced basis on the coarsest mesh {{addvc}}; "
+        f"{on} started from the coarser result{fields}."
     )
 
 
@@ -195,6 +213,7 @@ def endings(summary: dict, method: str) -> str:
 def noise_words(summary: dict) -> str:
     """The standard uncertainty by noise in voxels and micrometres."""
     found = [state["uncertainty"]["rms"] for state in summary["states"]]
+    found = [rms for rms in found if rms is not None]
     if not found:
         return ""
     micrometres = [rms * summary["voxel_size_um"] for rms in found]
@@ -230,6 +249,7 @@ def quality(summary: dict) -> str:
         "residual that the noise of the images explains; the others are flagged."
     )
     errors = [one["error"]["median"] for one in found if one["error"]]
+    errors = [median for median in errors if median is not None]
     known = f" Against the known truth the median error is {span(errors or [0], '.3f')} voxel."
     return text + (known if errors else "")
 

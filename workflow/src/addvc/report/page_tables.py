@@ -1,5 +1,7 @@
 """Tables of the first page of the report, in reStructuredText."""
 
+from addvc.errors import grey_words
+
 
 def figure(value: float | None, form: str) -> str:
     """A number in a format, or "unknown": a state that left the image has no residual."""
@@ -40,8 +42,9 @@ def results_table(summary: dict) -> list[str]:
         for mesh in summary["meshes"]:
             error = state[mesh]["error"] or {}
             sigma = state[mesh]["residual_std"], state.get("noise_std")
-            row = [state["label"], mesh, *(figure(value, ".3f") for value in sigma)]
-            rows.append(row + [f"{error[key]:.3f}" for key in ("median", "p95", "rms") if error])
+            row = [state["label"], mesh, *(grey_words(value, 3) for value in sigma)]
+            lengths = (error[key] for key in ("median", "p95", "rms") if error)
+            rows.append(row + [figure(length, ".3f") for length in lengths])
     return list_table(header, rows)
 
 

@@ -7,12 +7,12 @@ from addvc.report.case import Case
 from addvc.report.tables import write_tables
 
 FIGURES = {
-    "residual_std": ("σ(r) (grey levels)", "{:.3f}"),
+    "residual_std": ("σ(r) (grey levels)", "{:.4g}"),
     "outside": ("Points outside of the image", "{:d}"),
     "factors": ("Scale factors along x, y, z (Eq. 6)", "{}"),
-    "robust_std": ("Robust residual (grey levels)", "{:.3f}"),
+    "robust_std": ("Robust residual (grey levels)", "{:.4g}"),
     "elastic_strain": ("Elastic strain, rms (–)", "{:.4f}"),
-    "score": ("Score (grey levels²)", "{:.3f}"),
+    "score": ("Score (grey levels²)", "{:.4g}"),
 }
 
 

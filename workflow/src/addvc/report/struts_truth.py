@@ -1,6 +1,7 @@
 """Beyond the paper: measured struts against the truth, of a synthetic test."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,7 +9,7 @@ from matplotlib.axes import Axes
 from addvc.analysis.strut_table import RAW
 from addvc.report import style
 from addvc.report.case import Case
-from addvc.report.struts import COMPARED, columns, results, trusted
+from addvc.report.struts import columns, results, trusted
 
 QUANTITIES = {
     "struts": ("struts compared", "–"),
@@ -28,28 +29,45 @@ FLAGS = {
 }
 
 
+class Compared(NamedTuple):
+    """A column of the table of struts as it is drawn: times a factor, its name, its unit, its sign."""
+
+    column: str
+    factor: float
+    name: str
+    unit: str
+    signed: bool
+
+
+ROWS = (
+    Compared("bending_share", 1, "share of bending", "–", signed=False),
+    Compared("axial_strain", 100, "axial strain", "%", signed=True),
+)
+
+
 def against_truth(case: Case, outputs: Iterable[str]) -> None:
-    """Measured against true, a point a valid strut, a column a state: (top) share of bending,
-    (bottom) axial strain, of the micro and of the finest meso result."""
-    tables = {state: columns(case, state, True) for state in case.states}
-    count = len(tables)
+    """Measured against true, a point a valid strut, a column a state (of many, six): (top) share of
+    bending, (bottom) axial strain, of the micro and of the finest meso result."""
+    states, colours = case.pictured, {}
+    count = len(states)
     width = max(min(62.0, style.WIDTH / count) * count, 0.6 * style.WIDTH)
     fig = style.figure(132, width)
     axes = fig.subplots(2, count, squeeze=False)
-    for column, (state, table) in enumerate(tables.items()):
+    for column, state in enumerate(states):
+        table = columns(case, state, True)
         sources = results(case, table)
-        use, truth = trusted(table, sources), sources.pop("truth")[0]
-        for row, (ax, name, unit) in enumerate(zip(axes[:, column], COMPARED, (1, 100),
-                                                   strict=True)):  # fmt: skip
-            for own, colour in sources.values():
-                pair = (unit * table[name + ending][use] for ending in (truth, own))
-                scatter(ax, *pair, colour, signed=row == 1)
+        use, (truth, _) = trusted(table, sources), sources["truth"]
+        measured = {name: found for name, found in sources.items() if name != "truth"}
+        for row, (ax, drawn) in enumerate(zip(axes[:, column], ROWS, strict=True)):
+            for name, (own, colours[name]) in measured.items():
+                pair = (drawn.factor * table[drawn.column + end][use] for end in (truth, own))
+                scatter(ax, *pair, colours[name], drawn.signed)
             title = case.title(state, case.micro[0]).replace(", ", ",\n")
             style.headline(ax, title, count * row + column)
-            ax.set_xlabel(("share of bending,\ntruth (–)", "axial strain,\ntruth (%)")[row])
-    axes[0, 0].set_ylabel("share of bending, measured (–)")
-    axes[1, 0].set_ylabel("axial strain, measured (%)")
-    handles = [style.line(c, n, ls="", marker="o") for n, (_, c) in sources.items()]
+            ax.set_xlabel(f"{drawn.name},\ntruth ({drawn.unit})")
+    for ax, drawn in zip(axes[:, 0], ROWS, strict=True):
+        ax.set_ylabel(f"{drawn.name}, measured ({drawn.unit})")
+    handles = [style.line(colour, name, ls="", marker="o") for name, colour in colours.items()]
     handles.append(style.line("#777777", "measured as the truth"))
     fig.legend(handles=handles, loc="outside lower center", ncols=3)
     style.save(fig, outputs)
@@ -82,12 +100,12 @@ def truth_rows(case: Case) -> list[list[str]]:
     ]
     names = {"field": "true displacement", "beams": "beams of the twin"}
     names |= {case.micro[0] + RAW: f"{case.micro[0]}, as measured"}
-    flags = {n: read[n].pop("flags") for n in case.states}
+    flags = {n: read[n]["flags"] for n in case.states}
     for key, quantity in FLAGS.items():
         values = [_number(flags[n][key]) for n in case.states]
         rows.append([case.micro[0], names["field"], quantity, "–", *values])
-    for source, others in first.items():
-        for other in others:
+    for source in (source for source in first if source != "flags"):
+        for other in first[source]:
             found = [read[n][source][other] for n in case.states]
             for key, (quantity, unit) in QUANTITIES.items():
                 values = [_number(entry[key]) for entry in found]

@@ -41,7 +41,7 @@ def figures(row: dict, judged: bool) -> list[str]:
     cells = [
         str(row["iterations"]),
         "yes" if row["converged"] else "NO",
-        "–" if sigma is None else f"{sigma:.3f}",
+        "–" if sigma is None else f"{sigma:.4g}",
         f"{row['flagged']:.4f}",
     ]
     values = [row["error"][key] for key in ERRORS] if judged else []
@@ -163,7 +163,7 @@ def sensitivity(found: Sequence[dict], label: str, outputs: Iterable[str]) -> No
         ):
             _l_curve(ax, by_name[name], name, number)
     _columns(parts[-1], by_name, judged, len(curves))
-    fig.suptitle(f"state {label}, one parameter at a time", fontsize=9)
+    fig.suptitle(f"{label}, one parameter at a time", fontsize=9)
     style.save(fig, outputs)
 
 

@@ -187,7 +187,11 @@ def colour_bar(
 
 def voxels(voxel_um: float) -> str:
     """The unit of lengths, with its size."""
-    return f"voxels of {voxel_um:.3g} µm"
+    return (
+        f"voxels of {voxel_um:.3g} µm"
+        if voxel_um < 999.5
+        else f"voxels of {voxel_um / 1000:.3g} mm"
+    )
 
 
 def nice_length(reach: float) -> float:

@@ -12,6 +12,7 @@ from addvc.analysis.overlap import REST
 from addvc.config import METHODS
 from addvc.correlation.meso import meso_options
 from addvc.correlation.micro import micro_options
+from addvc.errors import grey_words
 from addvc.images.files import atomic_path
 from addvc.report.case import Case
 from addvc.report.methods import span
@@ -180,8 +181,8 @@ def _outcome(case: Case, name: str) -> dict[str, str]:
         label = case.labels[state]
         rows[f"Iterations, {label}"] = str(solution.iterations)
         rows[f"Verdict, {label}"] = case.verdict(name, state)
-        rows[f"σ(r) at the points of the mesh, {label} (grey levels)"] = (
-            f"{solution.residual['std']:.3f}"
+        rows[f"σ(r) at the points of the mesh, {label} (grey levels)"] = grey_words(
+            solution.residual["std"]
         )
     return rows
 

@@ -146,7 +146,7 @@ def answer(summary: dict) -> list[str]:
     size, count = summary["voxel_size_um"], len(summary["states"])
     lines = [
         f"Displacement of the solid at {count} loading state{'s' * (count != 1)}. Cell size "
-        f"{summary['cell_size']:.1f} voxels ({summary['cell_size'] * size:.0f} micrometres), "
+        f"{summary['cell_size']:.1f} voxels ({grey_words(summary['cell_size'] * size)} micrometres), "
         f"threshold {grey_words(summary['threshold'])} grey levels for a porosity of "
         f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.",
         *region_words(summary.get("region")),
@@ -203,7 +203,9 @@ def state_words(state: dict) -> str:
     sense = "compression" if state["strain"] >= 0 else "extension"
     named = "" if state["label"] == f"state {state['state']}" else f"{state['label']}; "
     platens = state.get("platens")
-    gap = f", {platens['strain']:.1%} by the platens" if platens else ""
+    same = platens and (platens["strain"] >= 0) == (state["strain"] >= 0)
+    sign = 1 if state["strain"] >= 0 or not same else -1
+    gap = f", {sign * platens['strain']:.1%} by the platens" if platens else ""
     return f"{state['state']} ({named}{abs(state['strain']):.1%} {sense} measured{gap})"
 
 
