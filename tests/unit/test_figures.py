@@ -330,7 +330,7 @@ def test_starts_that_were_tried_are_a_row_each(case, folder, cube, tmp_path):
     assert [row["Taken"] for row in rows[:3]] == ["no", "yes", "yes"]
     assert rows[0]["Scale factors along x, y, z (Eq. 6)"] == "1.000 / 0.900 / 1.000"
     assert rows[0]["Score (grey levels²)"] == "–"
-    assert rows[2]["Score (grey levels²)"] == "1.250"
+    assert rows[2]["Score (grey levels²)"] == "1.25"
 
 
 def test_the_table_of_errors_has_the_junctions_where_there_are_any(case, folder, tmp_path):

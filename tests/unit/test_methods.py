@@ -78,8 +78,12 @@ def test_what_was_put_into_the_mesh_and_what_was_left_out_is_told():
 
 def test_what_made_the_scans_and_what_was_left_of_them_is_told():
     assert "are synthetic, of a network of beams" in told(config())
-    given = {"case": "foam", "porosity": 0.96, "virtual": {"strains": [0.02]},
-             "scans": {"reference": "a.tif", "voxel_size_um": 9, "crop": [[0, 50], None, None]}}  # fmt: skip
+    given = {
+        "case": "foam",
+        "porosity": 0.96,
+        "virtual": {"strains": [0.02]},
+        "scans": {"reference": "a.tif", "voxel_size_um": 9, "crop": [[0, 50], None, None]},
+    }
     validate(given, str(ROOT / "workflow/schemas/config.schema.yaml"))
     scans = SCANS | {"scans": [SCANS["scans"][0] | {"binned_shape": [16, 46, 40]}]}
     text = "\n".join(methods(summary(state(1)), given, scans))

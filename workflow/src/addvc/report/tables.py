@@ -182,7 +182,7 @@ def _outcome(case: Case, name: str) -> dict[str, str]:
         rows[f"Iterations, {label}"] = str(solution.iterations)
         rows[f"Verdict, {label}"] = case.verdict(name, state)
         rows[f"σ(r) at the points of the mesh, {label} (grey levels)"] = grey_words(
-            solution.residual["std"]
+            solution.residual["std"], 3
         )
     return rows
 

@@ -146,7 +146,7 @@ def answer(summary: dict) -> list[str]:
     size, count = summary["voxel_size_um"], len(summary["states"])
     lines = [
         f"Displacement of the solid at {count} loading state{'s' * (count != 1)}. Cell size "
-        f"{summary['cell_size']:.1f} voxels ({grey_words(summary['cell_size'] * size)} micrometres), "
+        f"{summary['cell_size']:.1f} voxels ({figure(summary['cell_size'] * size, '.3g')} micrometres), "
         f"threshold {grey_words(summary['threshold'])} grey levels for a porosity of "
         f"{summary['porosity']:.3f}; a voxel of the binned image is {size:g} micrometres.",
         *region_words(summary.get("region")),
