@@ -16,7 +16,7 @@ from addvc.correlation.store import load_field, load_solution
 from addvc.correlation.transfer import transfer_matrix
 from addvc.errors import CorrelationError
 from addvc.fem.io import read_mesh
-from addvc.images.platens import moved_faces, seen
+from addvc.images.platens import both_faces
 from addvc.images.scans_store import load_volume
 
 log = logging.getLogger(__name__)
@@ -57,8 +57,8 @@ def followed(first: Field, second: Field) -> Field:
 def shortening(reference: np.ndarray, deformed: np.ndarray, axis: int) -> float:
     """By how much the platens have closed in, voxels. Raises CorrelationError where both images do not
     show both."""
-    faces = moved_faces(reference, deformed, axis)
-    if faces is None or not all(seen(faces[0], reference.shape[axis])):
+    faces = both_faces(reference, deformed, axis)
+    if faces is None:
         raise CorrelationError(
             f"the reference and a state do not both show both platens along axis {axis}, so that its "
             "displacement cannot be extrapolated; leave `extrapolated` out of meso.candidates"

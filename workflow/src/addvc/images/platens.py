@@ -45,6 +45,14 @@ def moved_faces(
     return (before, after) if seen(before, n) == seen(after, n) else None
 
 
+def both_faces(
+    reference: NDArray, deformed: NDArray, axis: int
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """The same where both images show both platens, else None."""
+    faces = moved_faces(reference, deformed, axis)
+    return faces if faces and all(seen(faces[0], reference.shape[axis])) else None
+
+
 def seen(faces: tuple[float, float], n: int) -> tuple[bool, bool]:
     """Which of both faces are those of a platen, and not the ends of an image of n rows."""
     return faces[0] > -0.5, faces[1] < n - 0.5
