@@ -173,7 +173,7 @@ def penalised(case: Case, outputs: Iterable[str]) -> None:
     axis = case.specimen.axis
     views = {"from the side": oblique(axis), "from above": oblique(axis, 35, 75)}
     tallest = max(aspect(view, mesh.points) for view in views.values())
-    fig, axes = style.panels(1, 2, tallest, spare=23, below=13)
+    fig, axes = style.panels(1, 2, tallest, spare=28, below=13)
     for panel, (ax, (name, view)) in enumerate(zip(axes[0], views.items(), strict=True)):
         render([Layer(mesh.points, faces, on_faces)], view, 80, shadows=True).show(ax)
         style.headline(ax, name, panel)
