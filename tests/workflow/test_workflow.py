@@ -98,7 +98,8 @@ def summary(results):
 
 def test_the_run_closes_with_the_verdict_of_each_state(run):
     for state in STATES:
-        assert re.search(rf"^  state {state} \(.*measured\): converged; sigma", run.stdout, re.M)
+        words = rf"^  state {state} \(.*measured, .*by the platens\): converged; sigma"
+        assert re.search(words, run.stdout, re.M)
     assert "open the report: xdg-open results/test/report.html" in run.stdout
 
 
@@ -114,6 +115,19 @@ def test_the_report_holds_everything_and_fetches_nothing(results):
     assert len(labels) > 15 and all(len(one) == 1 for one in labels), "two may become a switch"
     for name in figures():
         assert name in text
+
+
+def test_the_ends_of_the_mesh_go_with_the_platens_that_the_images_show(summary):
+    for state, strain in zip(summary["states"], (0.034, 0.052), strict=True):
+        assert state["platens"]["strain"] == pytest.approx(strain, abs=2e-3)
+        assert state["platens"]["apart"] < 0.2
+
+
+def test_what_is_in_the_fields_is_said_beside_them(results):
+    said = set(json.loads((results / "fields/fields.json").read_text())["fields"])
+    for path in results.glob("fields/*.vtu"):
+        fields = meshio.read(path)
+        assert {*fields.point_data, *fields.cell_data} <= said
 
 
 def test_there_is_a_scene_and_a_series_of_each_mesh(results):
