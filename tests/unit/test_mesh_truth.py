@@ -159,6 +159,11 @@ def test_a_file_without_what_is_needed(tmp_path):
             file[name] = np.zeros((4, 3))
     with pytest.raises(ConfigError, match=r"has no dataset \['displacement2'\]"):
         load_truth(path)
+    with h5py.File(path, "w") as file:
+        file["cells"], file["displacement1"] = np.zeros((1, 4), int), np.zeros((4, 3))
+        file.create_group("points")
+    with pytest.raises(ConfigError, match=r"has no dataset \['points'\]"):
+        load_truth(path)
     path.write_text("no HDF5")
     with pytest.raises(ConfigError, match="cannot be read as HDF5"):
         load_truth(path)
@@ -168,6 +173,19 @@ def test_meshes_that_cannot_be_interpolated_in_are_refused(block):
     points, cells, u = block._points, block._cells, block._u
     with pytest.raises(MeshError, match=r"cells of shape \(\d+, 8\); \(m, 4\) or \(m, 10\)"):
         MeshTruth(points, cells[:, :8], u)
+    for some, wrong in (
+        (points[:, :2], "points"),
+        (points[:0], "points"),
+        (points[:, 0], "points"),
+    ):
+        with pytest.raises(MeshError, match=rf"has {wrong} of shape .*; \(n, 3\) is needed"):
+            MeshTruth(some, cells, [some])
+    with pytest.raises(MeshError, match=r"has cells of shape \(0, 10\); \(m, 4\) or"):
+        MeshTruth(points, cells[:0], u)
+    with pytest.raises(
+        MeshError, match="cells of the truth are numbers of float64; give whole ones"
+    ):
+        MeshTruth(points, cells.astype(float), u)
     with pytest.raises(MeshError, match=r"displacement1 of the truth has shape \(\d+, 2\)"):
         MeshTruth(points, cells, [u[0][:, :2]])
     bent = points.copy()

@@ -64,7 +64,8 @@ class MeshTruth:
         with h5py.File(path) as file:
             count = sum(re.fullmatch(r"displacement\d+", name) is not None for name in file)
             wanted = {f"displacement{n}" for n in range(1, max(count, 1) + 1)}
-            missing = {"points", "cells", *wanted} - set(file)
+            there = {name for name, item in file.items() if isinstance(item, h5py.Dataset)}
+            missing = {"points", "cells", *wanted} - there
             if missing:
                 raise ConfigError(
                     f"truth {path} has no dataset {sorted(missing)}; a truth is a mesh (points, "
@@ -167,8 +168,14 @@ def _named(displacements: list[np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _check_shapes(points: np.ndarray, cells: np.ndarray, displacements: list[np.ndarray]) -> None:
-    if cells.ndim != 2 or cells.shape[1] not in (4, 10):
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+        raise MeshError(f"the truth has points of shape {points.shape}; (n, 3) is needed, x y z")
+    if cells.ndim != 2 or cells.shape[1] not in (4, 10) or len(cells) == 0:
         raise MeshError(f"the truth has cells of shape {cells.shape}; (m, 4) or (m, 10) is needed")
+    if cells.dtype.kind not in "iu":
+        raise MeshError(
+            f"the cells of the truth are numbers of {cells.dtype.name}; give whole ones, the nodes of each"
+        )
     for name, u in _named(displacements).items():
         if u.shape != points.shape:
             raise MeshError(
