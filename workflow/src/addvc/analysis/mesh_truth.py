@@ -174,7 +174,8 @@ def _check_shapes(points: np.ndarray, cells: np.ndarray, displacements: list[np.
         raise MeshError(f"the truth has cells of shape {cells.shape}; (m, 4) or (m, 10) is needed")
     if cells.dtype.kind not in "iu":
         raise MeshError(
-            f"the cells of the truth are numbers of {cells.dtype.name}; give whole ones, the nodes of each"
+            f"the cells of the truth are numbers of {cells.dtype.name}; give whole ones, the nodes of "
+            "each"
         )
     for name, u in _named(displacements).items():
         if u.shape != points.shape:
