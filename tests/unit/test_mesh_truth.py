@@ -118,7 +118,7 @@ def test_errors_are_split_along_and_across_struts(cross):
 
 def test_a_junction_is_as_far_off_as_its_nodes_are_on_the_mean(cross, rng):
     """One junction, in the middle: noise of its nodes averages out, what they share does not."""
-    points = rng.uniform(-1, 1, (500, 3))
+    points = rng.uniform(-1.9, 1.9, (500, 3))
     for shift, shares in ((0.8, [1, 1, 1]), (1.5, [0, 1, 1]), (3.0, [0, 0, 1])):
         u = rng.normal([0, shift, 0], 0.5, (500, 3))
         (found,) = errors_at(cross, points, [u], 1)
@@ -206,6 +206,17 @@ def test_numbers_that_are_none_and_nodes_that_are_not_there_are_refused(block):
         MeshError, match=rf"2 of the {len(points)} vectors of displacement1 .* finite"
     ):
         MeshTruth(points, cells, [gaps])
+
+
+def test_a_truth_in_another_unit_and_flat_cells_are_refused(block, rng):
+    x = rng.uniform([2, 2, 2], [8, 10, 8], (200, 3))
+    large = MeshTruth(20 * block._points, block._cells, block._u)
+    with pytest.raises(MeshError, match=r"measures 120 x 160 x 120, .* voxels of the binned"):
+        errors_at(large, x, [0 * x], 1)
+    cells = block._cells.copy()
+    cells[3] = cells[3, 0]
+    with pytest.raises(MeshError, match=rf"1 of {len(cells)} cells of the truth have no volume"):
+        MeshTruth(block._points, cells, block._u)
 
 
 def test_a_truth_that_lies_elsewhere_is_refused(block, rng, caplog):

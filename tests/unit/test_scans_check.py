@@ -9,7 +9,7 @@ import tifffile
 
 from addvc.errors import ConfigError, GeometryError, ScanError
 from addvc.images.scans import ScanFormat
-from addvc.images.scans_check import check_headers, check_scans
+from addvc.images.scans_check import check_headers, check_scans, check_slab
 
 SHAPE = (41, 37, 34)  # z, y, x
 
@@ -99,6 +99,23 @@ def test_a_voxel_size_that_the_header_contradicts_is_warned_of(tmp_path, pages):
     image.SetSpacing((0.0018, 0.0018, 0.01))
     sitk.WriteImage(image, tmp_path / "a.mha")
     assert "voxels of 0.0018 x 0.0018 x 0.01, which are no cubes" in check_headers(right)
+
+
+def test_scans_of_two_voxel_sizes_are_refused(tmp_path, pages):
+    image = sitk.GetImageFromArray(pages)
+    for name, edge in (("a.mha", 0.02), ("b.mha", 0.04)):
+        image.SetSpacing((edge,) * 3)
+        sitk.WriteImage(image, tmp_path / name)
+    with pytest.raises(
+        ScanError, match=r"b.mha has voxels of 0.04 x 0.04 x 0.04, but .*a.mha of 0.02"
+    ):
+        check_headers(config(tmp_path / "a.mha", tmp_path / "b.mha"))
+
+
+def test_a_slab_higher_than_the_image_is_refused():
+    with pytest.raises(ConfigError, match=r"height is 500 voxels \(at most 72, the image"):
+        check_slab({"height": 500}, 72)
+    check_slab({"height": 72}, 72)
 
 
 def test_a_cell_larger_than_half_of_the_image_is_refused(tmp_path, pages):

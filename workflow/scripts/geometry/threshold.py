@@ -11,5 +11,5 @@ with job(snakemake) as log:
     specimen = Specimen.from_dict(read_json(snakemake.input.specimen))
     wanted = snakemake.params.geometry["threshold"]
     result = find_threshold(smooth, specimen, snakemake.params.porosity, wanted, degree)
-    log.info("threshold %.2f, porosity %.4f", result["threshold"], result["porosity"])
+    log.info("threshold %.4g, porosity %.4f", result["threshold"], result["porosity"])
     write_json(snakemake.output[0], result)

@@ -87,6 +87,8 @@ def no_target(message: str) -> str:
     if not found:
         return ""
     names = [*STUDIES, *(path.stem for path in CAPTIONS.glob("*.rst"))]
+    if found[1] in names:
+        return f"{found[1]}: this configuration has none, as without loading states or a truth."
     close = get_close_matches(found[1].lower(), names, 1)
     return f"{found[1]}: nothing makes that" + (f"; did you mean {close[0]}?" if close else ".")
 

@@ -27,6 +27,9 @@ from addvc.images.files import atomic_path
 STRAIGHT = 1e-3
 """Voxels that the middle node of an edge may be off the middle of its ends."""
 
+FLAT = 1e-9
+"""Voxel^3 that a cell holds at least."""
+
 REACH = 1.5
 """Radius of the ball whose solid gives the axis of a strut, in diameters of struts."""
 
@@ -159,6 +162,12 @@ def _check(points: np.ndarray, cells: np.ndarray, displacements: list[np.ndarray
                 f"{bad} of the {len(values)} vectors of {name} of the truth are not finite; give all "
                 "nodes numbers, or leave out cells whose motion is not known"
             )
+    flat = int((np.abs(cell_volumes(Mesh(points, cells[:, :4]))) < FLAT).sum())
+    if flat:
+        raise MeshError(
+            f"{flat} of {len(cells)} cells of the truth have no volume (at least {FLAT:g} voxel^3); "
+            "leave them out, and check the order of their nodes"
+        )
     if cells.shape[1] == 10:
         _check_straight(points, cells)
 

@@ -17,6 +17,9 @@ log = logging.getLogger(__name__)
 BODY = 2.0
 """Voxels around a junction whose nodes move with it: some 1.5 radii of a strut."""
 
+LIKE = 5.0
+"""How much larger than the mesh of the struts, a part of it maybe, the solid of a truth may be."""
+
 AWAY, FEW = 2.0, 0.05
 """Voxels that a truth can be extrapolated by; the share of nodes that may be farther."""
 
@@ -38,6 +41,20 @@ def check_truth(path: str | Path, states: int) -> None:
         raise ConfigError(
             f"truth {path} has {truth.states} states (at least {states}, those of scans.states); add "
             "their displacements, or leave out `truth`"
+        )
+
+
+def check_size(solid: np.ndarray, nodes: np.ndarray) -> None:
+    """MeshError where the solid of the truth, by its points (n, 3), is over five times as large along
+    every axis as the mesh of the struts, by its nodes (q, 3), or under a fifth: another unit."""
+    sizes = np.ptp(solid, axis=0), np.ptp(nodes, axis=0)
+    times = sizes[0] / np.maximum(sizes[1], 1e-12)
+    if times.min() > LIKE or times.max() < 1 / LIKE:
+        words = (" x ".join(f"{edge:.4g}" for edge in size) for size in sizes)
+        raise MeshError(
+            "the solid of the truth measures {}, the mesh of the struts {} voxels (up to five times as "
+            "much or as little may be right): give its points, and displacements, in voxels of the "
+            "binned and cropped reference".format(*words)
         )
 
 
@@ -120,6 +137,8 @@ def errors_at(
     true = truth.displacement(points, state)
     if isinstance(truth, VirtualField):
         return [error_statistics(u - true, None) for u in fields]
+    if isinstance(truth, MeshTruth):
+        check_size(truth.mesh.points, points)
     _, tangent, distance = truth.strut(points)
     check_near(distance)
     return [

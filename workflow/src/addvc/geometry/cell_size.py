@@ -71,7 +71,8 @@ def secondary_peak(radius: np.ndarray, curve: np.ndarray) -> float:
     if len(peaks) == 0:
         raise GeometryError(
             f"the autocorrelation has no secondary peak up to {radius[-1]} voxels, so the cell size "
-            "is unknown; set geometry.cell_size (voxels of the binned image), or use a larger image"
+            "is unknown; lower scans.bin, set geometry.cell_size (voxels of the binned image), or use a "
+            "larger image"
         )
     top = peaks[np.argmax(smooth[peaks])]
     before, at, after = smooth[top - 1 : top + 2]

@@ -45,7 +45,7 @@ def bisect_threshold(
     if abs(best[1] - porosity) > max(tolerance, 0.05 * (1 - porosity)):
         raise GeometryError(
             f"no threshold gives a porosity of {porosity}: the nearest is {best[1]:.4f} at grey "
-            f"level {best[0]:.1f}; check porosity, or the bit depth of the scan"
+            f"level {grey_words(best[0])}; check porosity, or the bit depth of the scan"
         )
     return best[0], trials
 

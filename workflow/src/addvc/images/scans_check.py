@@ -5,6 +5,8 @@ import os
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from addvc.config import scan_files, scan_paths, scan_settings, voxel_size_um
 from addvc.errors import ConfigError, ScanError, refuse
 from addvc.images.platens import given_faces
@@ -110,6 +112,11 @@ def check_slab(region: str | dict, length: int) -> None:
             f"micro.region ({given}) lies outside of the image, which goes from 0 to {length} along the "
             "loading axis (voxels once cropped and binned, not micrometres): give a slab within that"
         )
+    if wanted.get("height", 0) > length:
+        raise ConfigError(
+            f"micro.region.height is {wanted['height']:g} voxels (at most {length}, the image along the "
+            "loading axis once cropped and binned): give it in voxels, not micrometres"
+        )
 
 
 def described(first: Checked, count: int, voxel_um: float, factor: int) -> str:
@@ -153,6 +160,15 @@ def _check_like(scan: Scan, first: Scan) -> None:
         raise ScanError(
             f"{scan.path} has {scan.shape} voxels, but {first.path} has {first.shape}; "
             "all states must have one size: crop or export them alike"
+        )
+    edges = scan.source.spacing, first.source.spacing
+    if None not in edges and not np.allclose(*edges, rtol=ALIKE, atol=0):
+        sizes = (" x ".join(f"{edge:g}" for edge in one) for one in edges)
+        raise ScanError(
+            "{} has voxels of {}, but {} of {}, as their headers say; all states must have one voxel "
+            "size: resample them, or correct the headers".format(
+                *(x for pair in zip((scan.path, first.path), sizes, strict=True) for x in pair)
+            )
         )
     if scan.dtype.newbyteorder("=") != first.dtype.newbyteorder("="):
         raise ScanError(

@@ -190,7 +190,8 @@ def platen_faces(volume: NDArray, axis: int, platens: str | Sequence[float]) -> 
     if high - low < MIN_ROWS:
         raise GeometryError(
             f"{high - low:.1f} rows lie between the platens ({low:.1f} to {high:.1f}), at least "
-            f"{MIN_ROWS} are needed; give platens: [LOW, HIGH] or none, or check loading_axis"
+            f"{MIN_ROWS} are needed; give platens: [LOW, HIGH] or none, or check loading_axis; if "
+            "struts are darker than the void, invert the scans"
         )
     return low, high
 
