@@ -5,7 +5,7 @@ import pytest
 
 from addvc.analysis.platens_check import beside, opened, platen_faces
 from addvc.report.doubts import strain_warnings
-from addvc.report.words import state_words
+from addvc.report.sentences import state_words
 
 
 @pytest.fixture

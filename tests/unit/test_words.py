@@ -15,18 +15,20 @@ from snakemake.utils import validate
 from addvc.errors import AddvcError, grey_words
 from addvc.report.doubts import strain_warnings
 from addvc.report.page_tables import results_table
-from addvc.report.thumbnail import thumbnail
-from addvc.report.words import (
+from addvc.report.sentences import (
     REASONS,
     bridge_words,
+    noise_words,
+    state_words,
+    strut_words,
+)
+from addvc.report.thumbnail import thumbnail
+from addvc.report.words import (
     check_verdicts,
     closing_lines,
     front_page,
     linked,
     micro_name,
-    noise_words,
-    state_words,
-    strut_words,
     warnings,
 )
 

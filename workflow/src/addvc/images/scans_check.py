@@ -84,16 +84,20 @@ def check_cell(cell_size: str | float | None, shape: tuple[int, ...]) -> None:
         )
 
 
+def edge_words(spacing: Sequence[float]) -> str:
+    """The edges of a voxel as a header has them: "0.02 x 0.02 x 0.05"."""
+    return " x ".join(f"{edge:g}" for edge in spacing)
+
+
 def spacing_words(spacing: Sequence[float] | None, voxel_um: float) -> str:
     """A warning where the header of a scan has voxels that are no cubes, or another voxel size, whatever
     its unit."""
     if spacing is None:
         return ""
     if max(spacing) > (1 + ALIKE) * min(spacing):
-        edges = " x ".join(f"{edge:g}" for edge in spacing)
         return (
-            f" (WARNING: the header has voxels of {edges}, which are no cubes: lengths and strains will "
-            "be wrong unless the header is; resample the scans to cubic voxels)"
+            f" (WARNING: the header has voxels of {edge_words(spacing)}, which are no cubes: lengths and "
+            "strains will be wrong unless the header is; resample the scans to cubic voxels)"
         )
     if any(abs(spacing[0] * unit / voxel_um - 1) < ALIKE for unit in UNITS_UM):
         return ""
@@ -104,7 +108,8 @@ def spacing_words(spacing: Sequence[float] | None, voxel_um: float) -> str:
 
 
 def check_slab(region: str | dict, length: int) -> None:
-    """ConfigError where the slab of `micro.region` lies outside an image of this length (voxels)."""
+    """ConfigError where the slab of `micro.region` lies outside an image of this length (voxels), or is
+    higher."""
     wanted = {} if region == "all" else region
     if wanted.get("low", 0) >= length or wanted.get("high", length) <= 0:
         given = ", ".join(f"{key} = {wanted[key]:g}" for key in ("low", "high") if key in wanted)
@@ -155,20 +160,19 @@ def _of_all(alike: Sequence[str]) -> str:
 
 
 def _check_like(scan: Scan, first: Scan) -> None:
-    """ScanError unless a scan has the size and the grey type (in either byte order) of the first."""
+    """ScanError unless a scan has the size, the voxels, as far as headers say, and the grey type (in
+    either byte order) of the first."""
     if scan.shape != first.shape:
         raise ScanError(
             f"{scan.path} has {scan.shape} voxels, but {first.path} has {first.shape}; "
             "all states must have one size: crop or export them alike"
         )
-    edges = scan.source.spacing, first.source.spacing
-    if None not in edges and not np.allclose(*edges, rtol=ALIKE, atol=0):
-        sizes = (" x ".join(f"{edge:g}" for edge in one) for one in edges)
+    edges, wanted = scan.source.spacing, first.source.spacing
+    if edges and wanted and not np.allclose(edges, wanted, rtol=ALIKE, atol=0):
         raise ScanError(
-            "{} has voxels of {}, but {} of {}, as their headers say; all states must have one voxel "
-            "size: resample them, or correct the headers".format(
-                *(x for pair in zip((scan.path, first.path), sizes, strict=True) for x in pair)
-            )
+            f"{scan.path} has voxels of {edge_words(edges)}, but {first.path} of {edge_words(wanted)}, "
+            "as their headers say; all states must have one voxel size: resample them, or correct the "
+            "headers"
         )
     if scan.dtype.newbyteorder("=") != first.dtype.newbyteorder("="):
         raise ScanError(
