@@ -96,8 +96,8 @@ def spacing_words(spacing: Sequence[float] | None, voxel_um: float) -> str:
         return ""
     if max(spacing) > (1 + ALIKE) * min(spacing):
         return (
-            f" (WARNING: the header has voxels of {edge_words(spacing)}, which are no cubes: lengths and "
-            "strains will be wrong unless the header is; resample the scans to cubic voxels)"
+            f" (WARNING: the header has voxels of {edge_words(spacing)}, which are no cubes: lengths "
+            "and strains will be wrong unless the header is; resample the scans to cubic voxels)"
         )
     if any(abs(spacing[0] * unit / voxel_um - 1) < ALIKE for unit in UNITS_UM):
         return ""
