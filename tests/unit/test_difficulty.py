@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addvc.analysis.difficulty import Projection, beyond_affine, difficulty, projections
+from addvc.analysis.difficulty import Best, beyond_affine, difficulty, projections
 from addvc.correlation.gauss_newton import rms
 from addvc.correlation.micro import micro_reference
 from addvc.images.spline import interpolating_coefficients
@@ -46,7 +46,7 @@ def test_nothing_of_an_affine_field_is_beyond_one(rng):
 
 def test_a_meso_mesh_holds_affine_fields_exactly(cloud, meso):
     points, weight, nodes = cloud
-    held, held_nodes = Projection(meso(2), points, weight, nodes)(affine(points))
+    held, held_nodes = Best.of(meso(2), points, weight, nodes)(affine(points))
     assert np.abs(held - affine(points)).max() < 1e-5  # a Laplacian of 1e-6 beside the mass
     assert rms(held_nodes - affine(nodes)) < 1e-5
 
@@ -56,23 +56,23 @@ def test_the_projection_is_the_best_field_of_its_mesh(cloud, meso):
     projection is itself."""
     points, weight, nodes = cloud
     mesh = meso(3)
-    project = Projection(mesh, points, weight, nodes)
-    held, _ = project(wave(points))
+    best = Best.of(mesh, points, weight, nodes)
+    held, _ = best(wave(points))
 
     def far(u):
         return np.average(np.sum((u - wave(points)) ** 2, axis=1), weights=weight)
 
-    assert far(held) < far(project.at_points @ wave(mesh.points))
+    assert far(held) < far(best.project.at_points @ wave(mesh.points))
     bump = np.random.default_rng(SEED).standard_normal(mesh.points.shape)
     for size in (1e-2, -1e-2):
-        assert far(held) < far(held + size * project.at_points @ bump)
-    assert project(held)[0] == pytest.approx(held, abs=1e-4)
+        assert far(held) < far(held + size * best.project.at_points @ bump)
+    assert best(held)[0] == pytest.approx(held, abs=1e-4)
 
 
 def test_what_a_mesh_cannot_hold_falls_with_the_square_of_its_size(cloud, meso):
     points, weight, nodes = cloud
     left = [
-        rms(Projection(meso(count), points, weight, nodes)(wave(points))[1] - wave(nodes))
+        rms(Best.of(meso(count), points, weight, nodes)(wave(points))[1] - wave(nodes))
         for count in (2, 4, 8)
     ]
     orders = np.log2(left[:-1]) - np.log2(left[1:])

@@ -10,9 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from addvc.analysis import frame_filter
 from addvc.analysis.balance import REFUSALS, balanced, micro_fields, refusal
-from addvc.analysis.carried import Attached, first_motion
-from addvc.analysis.frame_filter import WEIGHTS, Problem, best_fit, fitted, judged, mean_square
-from addvc.analysis.strut_frame import (
+from addvc.analysis.frame_filter import WEIGHTS, best_fit, judged
+from addvc.analysis.strut_table import RAW, Measured
+from addvc.correlation.frame_fit import Problem, fitted, mean_square
+from addvc.fem.carried import Attached, first_motion
+from addvc.fem.frame import Frame, FrameMotion, at_rest, energies, forces, moduli, skew, strains
+from addvc.geometry.centre_line import Curve
+from addvc.geometry.region import Region
+from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
+from addvc.geometry.strut_frame import (
     SHORTEST,
     StrutFrame,
     crossings,
@@ -24,11 +30,6 @@ from addvc.analysis.strut_frame import (
     strut_frame,
     widening,
 )
-from addvc.analysis.strut_table import RAW, Measured
-from addvc.fem.frame import Frame, FrameMotion, at_rest, energies, forces, moduli, skew, strains
-from addvc.geometry.centre_line import Curve
-from addvc.geometry.region import Region
-from addvc.geometry.skeleton import FREE_END, Branch, StrutGraph
 
 NU, SEED = 0.3, 2417
 TURN = Rotation.from_rotvec([0.9, -1.7, 0.6])

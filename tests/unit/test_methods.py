@@ -29,12 +29,13 @@ def state(number, converged=True, error=None, weight=1e4):
     }
     struts = {"valid": 340, "bending_share": 0.7 + 0.05 * number}
     return {"label": f"{number} %", "micro": found, "meso12": {"l_l": 3.7 * number},
+            "meso12-network": {"weight": weight},
             "struts": struts, "cells": {"bands": 1}, "equilibrium": {"weight": weight},
             "uncertainty": {"rms": 0.05 + 0.01 * number}}  # fmt: skip
 
 
 def summary(*states):
-    return {"cell_size": 28.8, "region": None, "topology": {"bridges": 0},
+    return {"cell_size": 28.8, "region": None, "network": ["meso12-network"], "topology": {"bridges": 0},
             "threshold": 47.8, "porosity": 0.96, "voxel_size_um": 20.01,
             "meshes": {"meso33": MESH, "meso12": MESH, "micro": MESH}, "states": list(states),
             "versions": {"addvc": "0.1.0", "commit": "ab12"}}  # fmt: skip
@@ -100,6 +101,15 @@ def test_nothing_is_said_of_what_was_not_done():
     del one["meshes"]["meso33"]
     text = "\n".join(methods(one, config(), SCANS))
     assert "finer meshes" not in text and "and micro DVC started" not in text
+
+
+def test_the_network_fit_is_told_where_it_was_made():
+    """And that no weight was taken, where none had less risk."""
+    assert "(meso12-network)." in told(config())
+    none = told(config(), state(1, weight=None), state(2, weight=None))
+    assert "(meso12-network; none had less risk than no fit)" in none
+    without = summary(state(1)) | {"network": []}
+    assert "frame of struts that" not in "\n".join(methods(without, config(), SCANS))
 
 
 def test_the_numbers_are_those_of_the_summary():

@@ -14,7 +14,12 @@ from snakemake.utils import validate
 
 from addvc.errors import AddvcError, grey_words
 from addvc.report.doubts import strain_warnings
-from addvc.report.page_tables import results_table
+from addvc.report.page_tables import (
+    convergence_table,
+    convergence_words,
+    network_words,
+    results_table,
+)
 from addvc.report.sentences import (
     REASONS,
     bridge_words,
@@ -66,6 +71,8 @@ def found(converged=True, valid=1.0, error=ERROR):
         "valid_nodes": valid,
         "l_e": 23.0,
         "l_l": None,
+        "weight": None,
+        "refused": None,
         "seconds": 0.3,
         "error": error,
     }
@@ -92,6 +99,7 @@ def summary(*states):
     return {
         "case": "foam-2_b",
         "methods": {"micro": "eq10"},
+        "network": [],
         "cell_size": 27.98,
         "threshold": 49.06,
         "porosity": 0.96,
@@ -119,6 +127,25 @@ def sections(text):
     """Title -> text of the sections of a page, by docutils."""
     tree = docutils.core.publish_doctree(text, settings_overrides={"report_level": 5})
     return {part[0].astext(): part.astext() for part in tree.findall(docutils.nodes.section)}
+
+
+def test_the_network_fit_has_a_row_beside_its_mesh():
+    """With its weight, or what is told where it is as it was."""
+    fit = {"weight": 1e5, "start": None}
+    taken = GOOD | {"meso12-network": found() | fit | {"error": ERROR | {"rms": 0.021}}}
+    same = DOUBTFUL | {"meso12-network": found() | {"weight": None, "refused": "risk"}}
+    given = summary(taken, same) | {"network": ["meso12-network"]}
+    told = network_words(given)
+    assert "meso12-network: meso12 near equilibrium" in told and "the same, in 2.4 %" in told
+    assert "the same" not in network_words(summary(taken) | {"network": ["meso12-network"]})
+    assert network_words(summary(GOOD)) == ""
+    rows = [
+        line for line in results_table(given) if line.strip(" *-").startswith(("meso", "micro"))
+    ]
+    assert [row.strip(" *-") for row in rows[:3]] == ["meso12", "meso12-network", "micro"]
+    table = "\n".join(convergence_table(given))
+    assert "w = 1.0e+05" in table and "w is the weight of equilibrium" in convergence_words(given)
+    assert "0.021" in "\n".join(results_table(given))
 
 
 # --------------------------------------------------------------------------- closing lines

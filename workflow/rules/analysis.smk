@@ -395,30 +395,6 @@ rule uncertainty:
         "../scripts/analysis/uncertainty.py"
 
 
-rule strut_frame:
-    input:
-        threshold=f"{R}/geometry/threshold.json",
-        reference=f"{R}/volumes/volume0.h5",
-        blurred=f"{R}/volumes/smooth0.h5",
-        region=f"{R}/geometry/region.json",
-    output:
-        f"{R}/geometry/frame.h5",
-    log:
-        f"{R}/logs/strut_frame/all.log",
-    benchmark:
-        f"{R}/benchmarks/strut_frame/all.tsv"
-    conda:
-        ENV
-    threads: 1
-    resources:
-        mem_mb=memory(1500, 15.0),
-        runtime=60,
-    params:
-        code=code("analysis/strut_frame.py"),
-    script:
-        "../scripts/analysis/strut_frame.py"
-
-
 rule struts:
     input:
         frame=f"{R}/geometry/frame.h5" if EQUILIBRIUM else [],
@@ -490,7 +466,8 @@ APART = [
 # What has no part in this configuration: an earlier one may have left its cost and its warnings.
 UNUSED = [
     *([] if FREEFORM else ["freeform"]),
-    *([] if EQUILIBRIUM else ["strut_frame"]),
+    *([] if EQUILIBRIUM or NETWORK else ["strut_frame"]),
+    *([] if NETWORK else ["network"]),
     *([] if HAS_TRUTH else ["truth_error"]),
     *([] if "height" in config["micro"]["region"] else ["meso_profile"]),
 ]
@@ -510,17 +487,11 @@ rule summary:
             name=["start", "micro_start", *FREEFORM],
             state=STATES,
         ),
-        expand(
-            f"{R}/dvc/{{mesh}}_state{{state}}.h5", mesh=[*MESO, *MICRO], state=STATES
-        ),
-        expand(
-            f"{R}/fields/{{mesh}}_state{{state}}.vtu",
-            mesh=[*MESO, *MICRO],
-            state=STATES,
-        ),
+        expand(f"{R}/dvc/{{mesh}}_state{{state}}.h5", mesh=RESULTS, state=STATES),
+        expand(f"{R}/fields/{{mesh}}_state{{state}}.vtu", mesh=RESULTS, state=STATES),
         expand(
             f"{R}/analysis/residual_{{mesh}}_state{{state}}.json",
-            mesh=[*MESO, *MICRO],
+            mesh=RESULTS,
             state=STATES,
         ),
         expand(
@@ -557,6 +528,7 @@ rule summary:
         states=LABELS,
         scope={
             "meshes": [*MESO, *MICRO],
+            "network": NETWORK,
             "methods": METHODS,
             "region": config["micro"]["region"] or "all",
             "finest": FINEST,

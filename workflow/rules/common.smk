@@ -79,10 +79,16 @@ STRUT_RESULTS = {  # results that struts are measured on, and how their columns 
     **({f"{MICRO[0]}_raw": "_raw"} if EQUILIBRIUM else {}),
     FINEST: "_meso",
 }
-RESULTS = [*MESO, *MICRO]  # all that is measured on, coarse to fine
+NETWORK = settings.network_names(config)
+RESULTS = [*MESO, *NETWORK, *MICRO]  # all that is measured on, coarse to fine
 EARLIER = ["previous", "extrapolated", "composed"]  # starts that need the state before
 FREEFORM = ["freeform"] if "freeform" in config["meso"]["candidates"] else []
-JUDGED = [*MESO, *FREEFORM, *MICRO]  # all that a truth, where known, is compared with
+JUDGED = [
+    *MESO,
+    *NETWORK,
+    *FREEFORM,
+    *MICRO,
+]  # all that a truth, where known, is compared with
 TRUTH = settings.truth_file(config) if KIND == "scans" else None
 if KIND == "virtual":
     TRUTH = f"{R}/truth/virtual.json"
@@ -99,7 +105,7 @@ ENV = "../../envs/addvc.yaml"
 
 wildcard_constraints:
     state=r"\d+",
-    mesh="|".join(MESO + MICRO),
+    mesh="|".join(RESULTS),
     meso="|".join(MESO),
     micro="|".join(MICRO),
     candidate="zero|platens",
@@ -216,8 +222,8 @@ def starts_on_micro(wildcards):
 
 
 def mesh_of(name):
-    """The mesh of a result: every micro method shares one."""
-    return f"{R}/geometry/{'micro' if name in MICRO else name}.vtu"
+    """The mesh of a result: every micro method shares one, and the network fit has that of its meso DVC."""
+    return f"{R}/geometry/{name.split('-')[0]}.vtu"
 
 
 def method_of(wildcards):

@@ -289,7 +289,7 @@ rule table2:
 
 rule more_ultimate:
     input:
-        expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=RESULTS),
+        expand(f"{R}/analysis/ultimate_{{mesh}}.json", mesh=[*MESO, *MICRO]),
     output:
         shown("more_ultimate.png", "more_ultimate", "Quality", "ultimate error"),
         drawing("more_ultimate"),

@@ -201,3 +201,27 @@ rule platen_grid:
         grid=config["grid"],
     script:
         "../scripts/geometry/platen_grid.py"
+
+
+rule strut_frame:
+    input:
+        threshold=f"{R}/geometry/threshold.json",
+        reference=f"{R}/volumes/volume0.h5",
+        blurred=f"{R}/volumes/smooth0.h5",
+        region=f"{R}/geometry/region.json",
+    output:
+        f"{R}/geometry/frame.h5",
+    log:
+        f"{R}/logs/strut_frame/all.log",
+    benchmark:
+        f"{R}/benchmarks/strut_frame/all.tsv"
+    conda:
+        ENV
+    threads: 1
+    resources:
+        mem_mb=memory(1500, 15.0),
+        runtime=60,
+    params:
+        code=code("geometry/strut_frame.py"),
+    script:
+        "../scripts/geometry/strut_frame.py"

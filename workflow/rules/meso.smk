@@ -133,6 +133,41 @@ rule meso_dvc:
         "../scripts/meso/meso_dvc.py"
 
 
+if NETWORK:
+
+    rule network:
+        input:
+            frame=f"{R}/geometry/frame.h5",
+            micro=f"{R}/geometry/micro.vtu",
+            mesh=f"{R}/geometry/{FINEST}.vtu",
+            figures=f"{R}/geometry/{FINEST}.json",
+            threshold=f"{R}/geometry/threshold.json",
+            reference=f"{R}/volumes/smooth0.h5",
+            deformed=f"{R}/volumes/smooth{{state}}.h5",
+            solution=f"{R}/dvc/{FINEST}_state{{state}}.h5",
+        output:
+            of_state("dvc/{mesh}_state{state}.h5", NETWORK),
+        log:
+            f"{R}/logs/network/state{{state}}.log",
+        benchmark:
+            f"{R}/benchmarks/network/state{{state}}.tsv"
+        conda:
+            ENV
+        threads: 1
+        resources:
+            mem_mb=memory(1500, VOXELS),
+            runtime=60,
+        params:
+            code=code("meso/network.py"),
+            meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
+            coarsest=len(MESO) == 1,
+            blur=config["images"]["blur"],
+            micro=section("micro", "nu", "robust"),
+            axis=AXIS,
+        script:
+            "../scripts/meso/network.py"
+
+
 rule meso_profile:
     input:
         mesh=f"{R}/geometry/{FINEST}.vtu",

@@ -24,6 +24,21 @@ rule transfer:
         "../scripts/micro/transfer.py"
 
 
+if NETWORK:
+
+    use rule transfer as transfer_network with:
+        input:
+            meshes=[mesh_of(name) for name in NETWORK],
+            micro=f"{R}/geometry/micro.vtu",
+            solutions=of_state("dvc/{mesh}_state{state}.h5", NETWORK),
+        output:
+            on_micro(NETWORK),
+        log:
+            f"{R}/logs/transfer_network/state{{state}}.log",
+        benchmark:
+            f"{R}/benchmarks/transfer_network/state{{state}}.tsv"
+
+
 rule field_on_micro:
     input:
         unpack(field_files),

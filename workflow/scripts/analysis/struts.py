@@ -3,13 +3,13 @@
 from addvc.runtime import job, told
 from addvc.analysis.balance import micro_fields
 from addvc.analysis.noise import turned
-from addvc.analysis.strut_frame import load_frame
 from addvc.analysis.strut_store import load_partition, write_columns
 from addvc.analysis.strut_table import MESO, Measured, described, foam, strut_table
 from addvc.correlation.micro import turns
 from addvc.correlation.store import load_field
 from addvc.fem.io import read_vtu
 from addvc.fem.mesh import Mesh
+from addvc.geometry.strut_frame import load_frame
 from addvc.images.files import read_json, write_json
 
 with job(snakemake) as log:

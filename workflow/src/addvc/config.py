@@ -166,6 +166,13 @@ def meso_names(config: dict) -> list[str]:
     return names
 
 
+def network_names(config: dict) -> list[str]:
+    """`meso12-network`, the finest meso result near equilibrium of the frame of struts, where it is
+    asked for; none of virtual tests, whose waves are in no equilibrium."""
+    wanted = config["meso"]["network"] and case_kind(config) != "virtual"
+    return [f"{meso_names(config)[-1]}-network"] if wanted else []
+
+
 def meso_size(config: dict, name: str, cell_size: float) -> float:
     """Mean edge of a meso mesh in voxels: as given, or the paper's times cell size / 28."""
     size = float(name.removeprefix("meso"))

@@ -8,10 +8,11 @@ import logging
 
 import numpy as np
 
-from addvc.analysis.carried import NEAR, Attached, first_motion
-from addvc.analysis.frame_filter import DOUBTED, Fit, Problem, best_fit, mean_square
-from addvc.analysis.strut_frame import StrutFrame
+from addvc.analysis.frame_filter import DOUBTED, Fit, best_fit
 from addvc.analysis.strut_table import RAW, Measured
+from addvc.correlation.frame_fit import Problem, mean_square
+from addvc.fem.carried import NEAR, Attached, first_motion
+from addvc.geometry.strut_frame import StrutFrame
 
 log = logging.getLogger(__name__)
 

@@ -4,18 +4,16 @@ The truth is projected on each mesh (least squares over the solid), so that what
 apart from what a method misses. For judging only.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
 
 from addvc.analysis.truth import Judge
 from addvc.correlation.gauss_newton import rms
 from addvc.correlation.metric import Reference, residual_at, residual_statistics
-from addvc.correlation.transfer import transfer_matrix
+from addvc.correlation.transfer import Projection, transfer_matrix
 from addvc.fem.mesh import Mesh
-from addvc.fem.operators import laplacian
-
-HOLD = 1e-6
-"""Weight of the Laplacian beside the mass matrix: it holds nodes with no solid around them."""
 
 
 def beyond_affine(points: np.ndarray, u: np.ndarray) -> float:
@@ -24,30 +22,28 @@ def beyond_affine(points: np.ndarray, u: np.ndarray) -> float:
     return rms(u - base @ np.linalg.lstsq(base, u, rcond=None)[0])
 
 
-class Projection:
-    """The best field of a mesh for displacements at points (Q, 3) with weights (Q,), in the sense of
-    least squares, seen at those points and at `nodes` (n, 3)."""
+@dataclass(frozen=True, eq=False)
+class Best:
+    """The best field of a mesh, and what it is at the nodes (n,) of the struts."""
 
-    def __init__(self, mesh: Mesh, points: np.ndarray, weight: np.ndarray, nodes: np.ndarray):
-        from sksparse.cholmod import cholesky
-
-        self.at_points, _ = transfer_matrix(mesh, points)
-        self.at_nodes, _ = transfer_matrix(mesh, nodes)
-        self._weighted = self.at_points.T @ sparse.diags(weight)
-        mass, stiff = self._weighted @ self.at_points, laplacian(mesh)
-        scale = HOLD * mass.diagonal().mean() / stiff.diagonal().mean()
-        self._solve = cholesky((mass + scale * stiff).tocsc())
+    project: Projection
+    at_nodes: sparse.csr_matrix
 
     def __call__(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """u (Q, 3) -> its projection at the points (Q, 3) and at the nodes (n, 3)."""
-        nodal = self._solve(self._weighted @ u)
-        return self.at_points @ nodal, self.at_nodes @ nodal
+        nodal = self.project.nodal(u)
+        return self.project.at_points @ nodal, self.at_nodes @ nodal
+
+    @classmethod
+    def of(cls, mesh: Mesh, points: np.ndarray, weight: np.ndarray, nodes: np.ndarray) -> "Best":
+        """From points (Q, 3) with weights (Q,), seen there and at nodes (n, 3)."""
+        return cls(Projection(mesh, points, weight), transfer_matrix(mesh, nodes)[0])
 
 
 def projections(reference: Reference, nodes: np.ndarray, meshes: dict[str, Mesh]) -> dict:
-    """The projection on each mesh from the micro quadrature, seen there and at nodes (n, 3)."""
+    """The best field of each mesh from the micro quadrature, seen there and at nodes (n, 3)."""
     q = reference.quadrature
-    return {name: Projection(mesh, q.points, q.weight, nodes) for name, mesh in meshes.items()}
+    return {name: Best.of(mesh, q.points, q.weight, nodes) for name, mesh in meshes.items()}
 
 
 def difficulty(
@@ -56,7 +52,7 @@ def difficulty(
     deformed: np.ndarray,
     state: int,
     nodes: np.ndarray,
-    best: dict[str, Projection],
+    best: dict[str, Best],
 ) -> dict:
     """What is left of a state with the spline coefficients `deformed`: sigma(r) at the micro
     quadrature (grey levels) and rms at nodes (n, 3) of the struts (voxels), at rest, under the truth,
@@ -73,8 +69,8 @@ def difficulty(
         "sigma": {"rest": sigma(np.zeros_like(points)), "truth": sigma(at_points)},
         "beyond": {"affine": beyond_affine(nodes, at_nodes)},
     }
-    for name, project in best.items():
-        held, held_nodes = project(at_points)
+    for name, best_field in best.items():
+        held, held_nodes = best_field(at_points)
         figures["sigma"][name] = sigma(held)
         figures["beyond"][name] = rms(held_nodes - at_nodes)
     if hasattr(truth, "rotation_angles"):

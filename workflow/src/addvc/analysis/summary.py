@@ -44,12 +44,14 @@ WARNED = re.compile(r"^\S+ \[([^]]+)\] WARNING: (.+)$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Scope:
-    """What there is to sum up: results from meso to micro, the method of each of the latter, the finest
-    meso mesh, the loading axis, `micro.region`, whether there is a truth and a free-form start, the
-    pre-filter (voxels) and the binning of scans, rules whose cost does not count, and whose warnings,
-    since they may run before or after, or are no part of this configuration."""
+    """What there is to sum up: results from meso to micro, the network fit where there is one, the
+    method of each micro result, the finest meso mesh, the loading axis, `micro.region`, whether there is
+    a truth and a free-form start, the pre-filter (voxels) and the binning of scans, rules whose cost
+    does not count, and whose warnings, since they may run before or after, or are no part of this
+    configuration."""
 
     meshes: list[str]
+    network: list[str]
     methods: dict[str, str]
     region: str | dict
     finest: str
@@ -69,6 +71,7 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
     return {
         "case": case,
         "methods": scope.methods,
+        "network": scope.network,
         "region": None if scope.region == "all" else read("geometry/region.json"),
         "cell_size": read("geometry/cell_size.json")["cell_size"],
         "threshold": threshold["threshold"],
@@ -132,7 +135,8 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh,
     along the loading axis and each other one; the platens beside its ends."""
     micro, axis = next(mesh for mesh in scope.meshes if mesh.startswith("micro")), scope.axis
-    result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.meshes}
+    names = [*scope.meshes, *scope.network]
+    result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in names}
     points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")
     trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
     along = [(points[trusted, d], point["displacement"][trusted, d]) for d in range(3)]
@@ -181,6 +185,8 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
         "shortest_l_e": is_shortest(notes.get("risk", [])),
         "torn": notes.get("torn", []),
         "l_l": notes.get("l_l"),
+        "weight": notes.get("weight"),
+        "refused": notes.get("refused"),
         "converged": solution.converged,
         "iterations": solution.iterations,
         "last_step": solution.history[-1],

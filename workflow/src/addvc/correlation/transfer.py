@@ -10,9 +10,13 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from addvc.fem.mesh import Mesh
+from addvc.fem.operators import laplacian
 from addvc.fem.quadrature import barycentric, locate_in_lattice
 
 CANDIDATES = 24
+
+HOLD = 1e-6
+"""Weight of the Laplacian beside the mass matrix: it holds nodes with no solid around them."""
 
 
 def locate(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,3 +63,26 @@ def lattice_matrix(lines: list[np.ndarray], mesh: Mesh, points: np.ndarray) -> s
     """The same from a rectilinear hexahedral grid with the given grid lines (extrapolated)."""
     cell, shape = locate_in_lattice(lines, points)
     return interpolation(mesh, cell, shape)
+
+
+class Projection:
+    """Back to a mesh: the field of it that is nearest to displacements at points (Q, 3) with weights
+    (Q,), in the sense of least squares. `at_points` (Q, n) goes from its nodes to the points."""
+
+    def __init__(self, mesh: Mesh, points: np.ndarray, weight: np.ndarray, hold: float = HOLD):
+        from sksparse.cholmod import cholesky
+
+        self.at_points, _ = transfer_matrix(mesh, points)
+        self._weighted = self.at_points.T @ sparse.diags(weight)
+        mass, stiff = self._weighted @ self.at_points, laplacian(mesh)
+        scale = hold * mass.diagonal().mean() / stiff.diagonal().mean()
+        self._solve = cholesky((mass + scale * stiff).tocsc())
+
+    def nodal(self, u: np.ndarray) -> np.ndarray:
+        """u (Q, 3) -> (n, 3) at the nodes; what no point is near to is carried on smoothly."""
+        return self._solve(self._weighted @ u)
+
+    def nodal_change(self, u: np.ndarray) -> np.ndarray:
+        """The same of a change u (Q, 3), zero at nodes whose cells have no point."""
+        touched = self.at_points.getnnz(axis=0) > 0
+        return self.nodal(u) * touched[:, None]

@@ -37,6 +37,13 @@ def gauss_points(mesh: Mesh, per_tet: int = 4) -> Quadrature:
     return Quadrature(cell, np.tile(shape, (len(mesh.cells), 1)), points, weight)
 
 
+def thinned(quadrature: Quadrature, most: int) -> Quadrature:
+    """One in so many points that about `most` are left, each with the weight of all that it is for."""
+    stride = max(1, round(len(quadrature) / most))
+    some = (part[::stride] for part in (quadrature.cell, quadrature.shape, quadrature.points))
+    return Quadrature(*some, stride * quadrature.weight[::stride])
+
+
 def voxel_points(
     mesh: Mesh,
     image_shape: tuple[int, int, int],

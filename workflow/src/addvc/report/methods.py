@@ -110,7 +110,21 @@ def meso(summary: dict, config: dict) -> str:
         "Each loading state was registered with the reference by finite-element DVC {dvc} on "
         f"tetrahedra with a mean edge of {edges} voxels, coarse to fine{clear}, from the start of least "
         f"residual: {starts}, each rescaled in a reduced basis on the coarsest mesh {{addvc}}; "
-        f"{on} started from the coarser result{fields}."
+        f"{on} started from the coarser result{fields}.{network_words(summary)}"
+    )
+
+
+def network_words(summary: dict) -> str:
+    """The network fit, where it was made."""
+    if not summary["network"]:
+        return ""
+    (name,) = summary["network"]
+    helped = any(state[name]["weight"] for state in summary["states"])
+    told = name if helped else f"{name}; none had less risk than no fit"
+    return (
+        " What the finest of these meshes had found was also fitted, robustly {robust}, by motions of "
+        "the frame of struts that the reference shows, which hardly need loads between their ends, at "
+        f"the weight of least unbiased risk {{stein}} in each state ({told})."
     )
 
 

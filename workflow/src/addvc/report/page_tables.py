@@ -13,6 +13,13 @@ def micro_name(summary: dict) -> str:
     return next(mesh for mesh in summary["meshes"] if mesh.startswith("micro"))
 
 
+def results(summary: dict) -> list[str]:
+    """All results, coarse to fine: the network fit, where there is one, is after its meso mesh."""
+    names = list(summary["meshes"])
+    first = names.index(micro_name(summary))
+    return [*names[:first], *summary["network"], *names[first:]]
+
+
 def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
     """A table in reStructuredText; "None." in place of one without rows."""
     if not rows:
@@ -31,6 +38,22 @@ RESIDUAL_WORDS = (
 )
 
 
+def network_words(summary: dict) -> str:
+    """What the result of the network fit is, and in which states it is that of its mesh; nothing where
+    it was not asked for."""
+    if not summary["network"]:
+        return ""
+    (name,) = summary["network"]
+    words = (
+        f" {name}: {name.split('-')[0]} near equilibrium of the frame of struts, by as much as the "
+        "images say that it helps."
+    )
+    same = [state["label"] for state in summary["states"] if state[name]["refused"]]
+    return (
+        f"{words} It does not, so that both are the same, in {', '.join(same)}." if same else words
+    )
+
+
 def results_table(summary: dict) -> list[str]:
     """sigma(r) on the micro quadrature beside that of noise alone and, with a truth, the error at bulk
     nodes."""
@@ -39,7 +62,7 @@ def results_table(summary: dict) -> list[str]:
     header += ["error median, voxel", "error p95, voxel", "error rms, voxel"] if known else []
     rows = []
     for state in summary["states"]:
-        for mesh in summary["meshes"]:
+        for mesh in results(summary):
             error = state[mesh]["error"] or {}
             sigma = state[mesh]["residual_std"], state.get("noise_std")
             row = [state["label"], mesh, *(grey_words(value, 3) for value in sigma)]
@@ -53,7 +76,7 @@ def convergence_table(summary: dict) -> list[str]:
     rows = [
         [
             state["label"],
-            state["micro_start"] if mesh.startswith("micro") else state[mesh]["start"],
+            start(state, mesh),
             mesh,
             cutoff(state[mesh]),
             str(state[mesh]["iterations"]),
@@ -61,22 +84,33 @@ def convergence_table(summary: dict) -> list[str]:
             "yes" if state[mesh]["converged"] else "NO",
         ]
         for state in summary["states"]
-        for mesh in summary["meshes"]
+        for mesh in results(summary)
     ]
-    header = ["state", "start", "mesh", "l_E or l_L, voxel", "iterations"]
+    header = ["state", "start", "mesh", "l_E, l_L (voxel) or w", "iterations"]
     return list_table([*header, "last rms(du), voxel", "converged"], rows)
+
+
+def start(state: dict, mesh: str) -> str:
+    """What a result starts from: the network fit from that of its mesh."""
+    if mesh.startswith("micro"):
+        return state["micro_start"]
+    return state[mesh]["start"] or mesh.split("-")[0]
 
 
 def convergence_words(summary: dict) -> str:
     """What the lengths of the table are not."""
     words = "The coarsest mesh has no regularisation"
+    if summary["network"]:
+        words += "; w is the weight of equilibrium"
     if "eq10" in summary["methods"].values():
         words += "; the lengths of eq10, which every state shares, are in Table 2"
     return words + "."
 
 
 def cutoff(result: dict) -> str:
-    """l_E of a micro result of the default kind, l_L of a meso one."""
+    """l_E of a micro result of the default kind, l_L of a meso one, w of a network fit."""
+    if result["weight"]:
+        return f"w = {result['weight']:.1e}"
     length = result["l_e"] or result["l_l"]
     return f"{length:.3g}" if length else "–"
 

@@ -17,6 +17,7 @@ from addvc.report.page_tables import (
     hashes_list,
     meshes_table,
     micro_name,
+    network_words,
     results_table,
     scans_table,
 )
@@ -93,7 +94,8 @@ def front_page(summary: dict, config: dict, scans: dict, picture: str | None = N
     lines += answer(summary) + shown(picture, summary) + look_around(summary)
     lines += heading("Warnings and failures") + warnings(summary)
     lines += heading("What next") + what_next(summary)
-    lines += [*heading("Residual and error of each mesh"), RESIDUAL_WORDS, *results_table(summary)]
+    lines += heading("Residual and error of each mesh")
+    lines += [RESIDUAL_WORDS + network_words(summary), *results_table(summary)]
     lines += [*heading("Convergence"), convergence_words(summary), *convergence_table(summary)]
     lines += heading("Meshes") + meshes_table(summary)
     lines += heading("Methods, to paste") + methods(summary, config, scans)

@@ -1,8 +1,8 @@
 """The foam as a frame of beams, thin struts included."""
 
 from addvc.runtime import job
-from addvc.analysis.strut_frame import save_frame, strut_frame
 from addvc.geometry.region import Region
+from addvc.geometry.strut_frame import save_frame, strut_frame
 from addvc.images.files import read_json
 from addvc.images.scans_store import load_volume
 

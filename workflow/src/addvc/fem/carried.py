@@ -79,12 +79,11 @@ class Attached:
         weights = np.stack([1 - self.share, self.share])[..., None]
         eye = np.broadcast_to(np.eye(3), (2, count, 3, 3))
         blocks = weights * np.concatenate([eye, -skew(self.turned(motion))], axis=-1)
-        columns = 6 * self.ends.T[..., None] + np.arange(6)
-        rows = np.broadcast_to(3 * np.arange(count)[:, None] + np.arange(3), (2, count, 3))
-        index = (
-            np.repeat(rows.ravel(), 6), np.repeat(columns[:, :, None], 3, axis=2).ravel()
-        )  # fmt: skip
-        return sparse.csr_matrix((blocks.ravel(), index), shape=(3 * count, size))
+        columns = 6 * self.ends[..., None] + np.arange(6)
+        entries = np.ascontiguousarray(blocks.transpose(1, 2, 0, 3))  # of a row: two ends, six dofs
+        indices = np.broadcast_to(columns[:, None], entries.shape)
+        starts = 12 * np.arange(3 * count + 1)
+        return sparse.csr_matrix((entries.ravel(), indices.ravel(), starts), (3 * count, size))
 
 
 def first_motion(frame: Frame, points: np.ndarray, u: np.ndarray) -> FrameMotion:

@@ -1,0 +1,134 @@
+"""What struts in equilibrium make of a coarse displacement, and when the images take it."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from addvc.correlation.meso import MesoOptions, meso_system
+from addvc.correlation.network import REFUSALS, images_of, network_fit
+from addvc.correlation.register import Stop, register
+from addvc.correlation.transfer import transfer_matrix
+from addvc.correlation.uncertainty import Noise
+from addvc.fem.frame import Frame
+from addvc.geometry.meso import box_section, extruded
+from addvc.geometry.strut_frame import StrutFrame
+from addvc.geometry.stuffing import stuff
+from verification.frame import CENTRE, CORNERS, SHAPE, STRUTS, image, rms_error
+from verification.test_cutoff import bowed
+
+NOISE, NU, PIECES = 6.0, 0.28, 6
+TURN = Rotation.from_rotvec([0.02, -0.03, 0.015])
+
+
+def rigid(points):
+    return TURN.apply(points - CENTRE) + CENTRE + [0.3, -0.2, 0.25] - points
+
+
+def back(x):
+    return TURN.inv().apply(x - CENTRE - [0.3, -0.2, 0.25]) + CENTRE
+
+
+def noisy(back_, seed):
+    """The frame moved, with noise of a fifteenth of the contrast."""
+    noise = np.random.default_rng(seed).normal(scale=NOISE, size=SHAPE)
+    return (image(back_) + noise).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def still():
+    return noisy(lambda x: x, 2417)
+
+
+@pytest.fixture(scope="module")
+def held():
+    """The frame of struts of `frame`, free of loads everywhere."""
+    points, pieces = list(CORNERS), []
+    for a, b in STRUTS:
+        inner = range(len(points), len(points) + PIECES - 1)
+        share = np.linspace(0, 1, PIECES + 1)[1:-1, None]
+        points += list(CORNERS[a] + share * (CORNERS[b] - CORNERS[a]))
+        chain = [a, *inner, b]
+        pieces += pairwise(chain)
+    frame = Frame(np.array(points), np.array(pieces), np.full(len(pieces), np.pi * 1.4**2))
+    return StrutFrame(frame, np.zeros(len(points), bool), 20.0)
+
+
+@pytest.fixture(scope="module")
+def meso(still):
+    """A mesh of 7 voxels about the frame, its system, and the mesh of the struts."""
+    mesh = extruded(*box_section(((6, 38), (6, 38)), 7.0), np.linspace(6, 38, 6), 1)
+    system = meso_system(mesh, still, MesoOptions(1, 4.0, 28.0))
+    return mesh, system, stuff(image(lambda x: x), 60.0, 1.6)
+
+
+def registered(meso, still, deformed):
+    """What meso DVC finds from rest, and what it is judged by."""
+    mesh, system, micro = meso
+    solution = register(system, deformed, np.zeros_like(mesh.points), Stop(2e-3, 100))
+    return solution, images_of(micro, [still, deformed], system, None, Noise(NOISE, 0.0))
+
+
+def errors(meso, truth, *fields):
+    """rms of each field on the meso mesh at the nodes of the struts."""
+    mesh, _, micro = meso
+    into, _ = transfer_matrix(mesh, micro.points)
+    return [rms_error(into @ u, truth(micro.points)) for u in fields]
+
+
+@pytest.mark.parametrize("seed", [31, 32])
+def test_the_noise_of_struts_that_only_turn_is_taken_off(meso, held, still, seed):
+    solution, judge = registered(meso, still, noisy(back, seed))
+    found, notes = network_fit(held, meso[0], solution, judge, NU)
+    before, after = errors(meso, rigid, solution.u, found.u)
+    assert notes["refused"] is None and found.converged
+    assert after < 0.7 * before
+    risks = {row["weight"]: row["risk"] for row in notes["trials"]}
+    assert min(risks, key=risks.get) == notes["weight"] and risks[0.0] > risks[notes["weight"]]
+
+
+def test_a_strut_in_the_wrong_place_is_brought_back(meso, held, still):
+    """Meso DVC has put the middle of a strut three voxels, more than its diameter, to the side."""
+    solution, judge = registered(meso, still, noisy(back, 31))
+    middle = CORNERS[list(STRUTS[0])].mean(axis=0)
+    off = np.linalg.norm(meso[0].points - middle, axis=1) < 6
+    assert off.sum() >= 3
+    wrong = replace(solution, u=solution.u + 3.0 * off[:, None] * [0, 0, 1])
+    found, notes = network_fit(held, meso[0], wrong, judge, NU)
+    before, after = errors(meso, rigid, wrong.u, found.u)
+    assert notes["refused"] is None and after < 0.25 * before
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 1.0])
+def test_what_no_equilibrium_explains_is_hardly_changed(meso, held, still, amplitude):
+    """Struts that are waved about, as they would need loads for all along them."""
+    wave, from_ = bowed(amplitude, 24)
+    solution, judge = registered(meso, still, noisy(from_, 31))
+    found, notes = network_fit(held, meso[0], solution, judge, NU)
+    before, after = errors(meso, wave, solution.u, found.u)
+    assert notes["refused"] == "risk" or after < 1.05 * before
+
+
+def test_the_displacement_stays_where_the_frame_can_say_nothing(meso, held, still):
+    solution, judge = registered(meso, still, noisy(back, 31))
+    nodes = len(held.frame.points)
+    empty = Frame(np.zeros((0, 3)), np.zeros((0, 2), int), np.zeros(0))
+    cases = {
+        "unseen": StrutFrame(empty, np.zeros(0, bool), 0.0),
+        "clamped": StrutFrame(held.frame, np.ones(nodes, bool), held.span),
+    }
+    for refused, one in cases.items():
+        found, notes = network_fit(one, meso[0], solution, judge, NU)
+        assert found is solution and notes["refused"] == refused and refused in REFUSALS
+        assert notes["weight"] is None and notes["trials"] == []
+
+
+def test_nodes_without_struts_around_them_stay(meso, held, still):
+    solution, judge = registered(meso, still, noisy(back, 31))
+    found, _ = network_fit(held, meso[0], solution, judge, NU)
+    into, _ = transfer_matrix(meso[0], judge.reference.quadrature.points)
+    alone = into.getnnz(axis=0) == 0
+    assert alone.any() and (found.u[alone] == solution.u[alone]).all()
+    assert (found.u[~alone] != solution.u[~alone]).any()

@@ -1,0 +1,29 @@
+"""What the finest meso mesh has found, near equilibrium of the frame of struts."""
+
+from dataclasses import replace
+
+from addvc.runtime import job
+from addvc.correlation.meso import meso_options, meso_system
+from addvc.correlation.micro import robust_scale
+from addvc.correlation.network import images_of, network_fit
+from addvc.correlation.store import load_solution, save_solution
+from addvc.correlation.uncertainty import Noise
+from addvc.fem.io import read_mesh
+from addvc.geometry.strut_frame import load_frame
+from addvc.images.files import read_json
+from addvc.images.scans_store import load_coefficients
+
+with job(snakemake):
+    source, params = snakemake.input, snakemake.params
+    reference, degree = load_coefficients(source.reference)
+    images = [reference, load_coefficients(source.deformed)[0]]
+    mesh, levels = read_mesh(source.mesh), read_json(source.threshold)
+    solution, found = load_solution(source.solution)
+    size = read_json(source.figures)["mean_edge"]
+    options = meso_options(params.meso, size, params.axis, params.coarsest, degree)
+    system = meso_system(mesh, reference, replace(options, cutoff=found["l_l"]))
+    noise, scale = Noise(levels["noise"], params.blur), robust_scale(params.micro["robust"], levels)
+    judge = images_of(read_mesh(source.micro), images, system, scale, noise)
+    frame, nu = load_frame(source.frame), params.micro["nu"]
+    solution, notes = network_fit(frame, mesh, solution, judge, nu)
+    save_solution(snakemake.output[0], solution, mesh, l_l=found["l_l"], **notes)
