@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from addvc.correlation.meso import MesoOptions, meso_system
-from addvc.correlation.network import REFUSALS, images_of, network_fit
+from addvc.correlation.network import REFUSALS, network_fit
+from addvc.correlation.network_risk import images_of
 from addvc.correlation.register import Stop, register
 from addvc.correlation.transfer import transfer_matrix
 from addvc.correlation.uncertainty import Noise
@@ -132,3 +133,37 @@ def test_nodes_without_struts_around_them_stay(meso, held, still):
     alone = into.getnnz(axis=0) == 0
     assert alone.any() and (found.u[alone] == solution.u[alone]).all()
     assert (found.u[~alone] != solution.u[~alone]).any()
+
+
+def test_noise_that_the_residual_does_not_hold_is_none(meso, still):
+    """The texture of a void that is not empty: here the noise is said to be ten times what it is."""
+    mesh, system, micro = meso
+    deformed = noisy(back, 31)
+    solution, _ = registered(meso, still, deformed)
+    shares = []
+    for times in (1, 10):
+        noise = Noise(times * NOISE, 0.0)
+        judge = images_of(micro, [still, deformed], system, None, noise)
+        into, _ = transfer_matrix(mesh, judge.reference.quadrature.points)
+        answers = np.stack([into @ one for one in judge.answers])
+        shares.append(judge.share(into @ solution.u, answers))
+    assert shares[0] == pytest.approx(1, abs=0.2)
+    assert shares[1] == pytest.approx(0.01, rel=0.2)
+
+
+def test_risks_differ_as_the_errors_do(meso, still):
+    """In the metric of the images: what leaves half of the noise in it has less error and less risk,
+    and both differ by as much."""
+    differences = []
+    for seed in range(31, 39):
+        solution, judge = registered(meso, still, noisy(lambda x: x, seed))
+        into, _ = transfer_matrix(meso[0], judge.reference.quadrature.points)
+        u, answers = into @ solution.u, np.stack([into @ one for one in judge.answers])
+        errors_, risks = [], []
+        for left in (1.0, 0.5):
+            errors_.append(judge.mean(judge.along(left * u[None]) ** 2))
+            risks.append(judge.risk(left * u, left * answers, 1.0)["risk"])
+        differences.append((errors_[0] - errors_[1], risks[0] - risks[1]))
+    errors_, risks = np.array(differences).T
+    assert (errors_ > 0).all()
+    assert risks.mean() == pytest.approx(errors_.mean(), rel=0.3)

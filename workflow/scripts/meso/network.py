@@ -5,7 +5,8 @@ from dataclasses import replace
 from addvc.runtime import job
 from addvc.correlation.meso import meso_options, meso_system
 from addvc.correlation.micro import robust_scale
-from addvc.correlation.network import images_of, network_fit
+from addvc.correlation.network import network_fit
+from addvc.correlation.network_risk import images_of
 from addvc.correlation.store import load_solution, save_solution
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.io import read_mesh
