@@ -206,6 +206,18 @@ def test_a_right_configuration_passes():
     assert check_config(own(micro={"region": {"low": 40}}), SCHEMA) == []
 
 
+@pytest.mark.parametrize("kind", [{"twin": {"size": "tiny"}}, {"virtual": {}}, {}])
+def test_a_slab_that_is_to_be_found_wants_states_not_their_strains(kind):
+    """Of a twin and of virtual states the schema has some: who gives none has those."""
+    slab = {"micro": {"region": {"height": 40}}}
+    images = {"scans": None} if "twin" in kind else {}
+    if "virtual" in kind:
+        images = {"scans": {"reference": "a.tif", "voxel_size_um": 20}}
+    check_config(own(**slab, **kind, **images), SCHEMA)
+    with pytest.raises(ConfigError, match="0 loading states"):
+        check_config(own(**slab) | scans(states=[]), SCHEMA)
+
+
 def test_what_may_be_forgotten_is_warned_of():
     (warning,) = check_config({"case": "mine", "porosity": 0.96}, SCHEMA)
     assert "neither `scans` nor `twin`" in warning and "as case mine" in warning

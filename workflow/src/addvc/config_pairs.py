@@ -90,7 +90,9 @@ def check_region(config: dict) -> None:
             "micro.region has a height, whose place meso DVC finds, and low or high, which give one; "
             "leave out either"
         )
-    if "height" in wanted and not settings.state_strains(config):
+    kind = settings.case_kind(config)
+    states = (config.get(kind) or {}).get("states" if kind == "scans" else "strains")
+    if "height" in wanted and states == []:  # not given, those of the schema are
         raise ConfigError(
             "micro.region has a height, whose place the residual of meso DVC finds, and there are 0 "
             "loading states (at least 1); add scans.states, or give low and high"
