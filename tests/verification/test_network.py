@@ -69,7 +69,7 @@ def registered(meso, still, deformed):
     """What meso DVC finds from rest, and what it is judged by."""
     mesh, system, micro = meso
     solution = register(system, deformed, np.zeros_like(mesh.points), Stop(2e-3, 100))
-    return solution, images_of(micro, [still, deformed], system, None, Noise(NOISE, 0.0))
+    return solution, images_of(micro, 0, [still, deformed], system, None, Noise(NOISE, 0.0))
 
 
 def errors(meso, truth, *fields):
@@ -143,7 +143,7 @@ def test_noise_that_the_residual_does_not_hold_is_none(meso, still):
     shares = []
     for times in (1, 10):
         noise = Noise(times * NOISE, 0.0)
-        judge = images_of(micro, [still, deformed], system, None, noise)
+        judge = images_of(micro, 0, [still, deformed], system, None, noise)
         into, _ = transfer_matrix(mesh, judge.reference.quadrature.points)
         answers = np.stack([into @ one for one in judge.answers])
         shares.append(judge.share(into @ solution.u, answers))

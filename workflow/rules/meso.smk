@@ -156,7 +156,7 @@ if NETWORK:
         threads: 1
         resources:
             mem_mb=memory(1500, VOXELS),
-            runtime=60,
+            runtime=240,
         params:
             code=code("meso/network.py"),
             meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),

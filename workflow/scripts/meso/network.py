@@ -24,7 +24,7 @@ with job(snakemake):
     options = meso_options(params.meso, size, params.axis, params.coarsest, degree)
     system = meso_system(mesh, reference, replace(options, cutoff=found["l_l"]))
     noise, scale = Noise(levels["noise"], params.blur), robust_scale(params.micro["robust"], levels)
-    judge = images_of(read_mesh(source.micro), images, system, scale, noise)
-    frame, nu = load_frame(source.frame), params.micro["nu"]
-    solution, notes = network_fit(frame, mesh, solution, judge, nu)
+    frame, micro = load_frame(source.frame), read_mesh(source.micro)
+    judge = images_of(micro, len(frame.frame.points), images, system, scale, noise)
+    solution, notes = network_fit(frame, mesh, solution, judge, params.micro["nu"])
     save_solution(snakemake.output[0], solution, mesh, l_l=found["l_l"], **notes)
