@@ -35,7 +35,8 @@ def state(number, converged=True, error=None, weight=1e4):
 
 
 def summary(*states):
-    return {"cell_size": 28.8, "region": None, "network": ["meso12-network"], "topology": {"bridges": 0},
+    return {"cell_size": 28.8, "region": None, "topology": {"bridges": 0},
+            "results": ["meso33", "meso12", "meso12-network", "micro"],
             "threshold": 47.8, "porosity": 0.96, "voxel_size_um": 20.01,
             "meshes": {"meso33": MESH, "meso12": MESH, "micro": MESH}, "states": list(states),
             "versions": {"addvc": "0.1.0", "commit": "ab12"}}  # fmt: skip
@@ -104,12 +105,13 @@ def test_nothing_is_said_of_what_was_not_done():
 
 
 def test_the_network_fit_is_told_where_it_was_made():
-    """And that no weight was taken, where none had less risk."""
-    assert "(meso12-network)." in told(config())
-    none = told(config(), state(1, weight=None), state(2, weight=None))
-    assert "(meso12-network; none had less risk than no fit)" in none
-    without = summary(state(1)) | {"network": []}
-    assert "frame of struts that" not in "\n".join(methods(without, config(), SCANS))
+    """And the states in which no weight was taken."""
+    assert "in each state (meso12-network)." in told(config())
+    one = told(config(), state(1), state(2, weight=None))
+    assert "in each state (meso12-network; not in 2 %)." in one
+    none = told(config(), state(1, weight=None))
+    without = summary(state(1)) | {"results": ["meso33", "meso12", "micro"]}
+    assert "also fitted" not in none + "\n".join(methods(without, config(), SCANS))
 
 
 def test_the_numbers_are_those_of_the_summary():

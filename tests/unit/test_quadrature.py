@@ -13,6 +13,7 @@ from addvc.fem.quadrature import (
     interpolate,
     lattice_points,
     locate_in_lattice,
+    thinned,
     voxel_points,
 )
 from addvc.geometry.grid import hex_grid
@@ -133,3 +134,12 @@ def test_number_of_threads_changes_nothing(mesh, with_one_and_two_threads):
     assert_array_equal(
         *with_one_and_two_threads(lambda: interpolate(mesh.cells, q.cell, q.shape, field))
     )
+
+
+@pytest.mark.parametrize("most", [400, 70, 1])
+def test_fewer_points_weigh_what_all_do(mesh, most):
+    whole = gauss_points(mesh)
+    some = thinned(whole, most)
+    assert len(some) == pytest.approx(most, rel=0.3)
+    assert some.weight.sum() == pytest.approx(whole.weight.sum())
+    assert set(map(tuple, some.points)) <= set(map(tuple, whole.points))

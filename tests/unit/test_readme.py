@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 RESULT = {"converged": True, "error": {"rms": 0.0871, "p95": 0.1449}}
 SUMMARY = {
     "meshes": {"meso12": {}, "micro": {}},
-    "network": ["meso12-network"],
+    "results": ["meso12", "meso12-network", "micro"],
     "states": [
         {"label": "3.4 %", "state": 1, "meso12": RESULT, "meso12-network": RESULT, "micro": RESULT},
         {

@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 from numpy.testing import assert_allclose
 
-from addvc.correlation.transfer import lattice_matrix, locate, transfer_matrix
+from addvc.correlation.transfer import Projection, lattice_matrix, locate, transfer_matrix
 from addvc.fem.mesh import Mesh, oriented
 from addvc.geometry.grid import hex_grid
 
@@ -66,3 +66,14 @@ def test_from_a_lattice_an_affine_field_is_exact_even_outside(rng):
     lines = [np.array([0.0, 9, 20]), np.array([-3.0, 5, 12, 30]), np.array([0.0, 25])]
     mesh, x = hex_grid(lines), rng.uniform(-5, 35, (500, 3))
     assert_allclose(lattice_matrix(lines, mesh, x) @ affine(mesh.points), affine(x), atol=1e-12)
+
+
+def test_a_change_goes_back_to_where_its_points_are(mesh, rng):
+    """Affine there, zero at nodes whose cells have no point; a field is carried on beyond them."""
+    x = rng.uniform([2, 2, 2], [15, 38, 33], (4000, 3))
+    ones = np.ones(len(x))
+    field, change = (Projection(mesh, x, ones, change=only) for only in (False, True))
+    away = change.at_points.getnnz(axis=0) == 0
+    assert away.any() and (change.nodal(affine(x))[away] == 0).all()
+    assert np.abs(change.at_points @ change.nodal(affine(x)) - affine(x)).mean() < 1e-4
+    assert np.abs(field.nodal(np.ones((len(x), 3)))[away] - 1).max() < 1e-3

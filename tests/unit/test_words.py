@@ -99,7 +99,7 @@ def summary(*states):
     return {
         "case": "foam-2_b",
         "methods": {"micro": "eq10"},
-        "network": [],
+        "results": ["meso12", "micro"],
         "cell_size": 27.98,
         "threshold": 49.06,
         "porosity": 0.96,
@@ -133,11 +133,16 @@ def test_the_network_fit_has_a_row_beside_its_mesh():
     """With its weight, or what is told where it is as it was."""
     fit = {"weight": 1e5, "start": None}
     taken = GOOD | {"meso12-network": found() | fit | {"error": ERROR | {"rms": 0.021}}}
-    same = DOUBTFUL | {"meso12-network": found() | {"weight": None, "refused": "risk"}}
-    given = summary(taken, same) | {"network": ["meso12-network"]}
+    same = DOUBTFUL | {"meso12-network": found() | {"weight": None, "refused": "no loads help"}}
+    given = summary(taken, same) | {"results": ["meso12", "meso12-network", "micro"]}
     told = network_words(given)
-    assert "meso12-network: meso12 near equilibrium" in told and "the same, in 2.4 %" in told
-    assert "the same" not in network_words(summary(taken) | {"network": ["meso12-network"]})
+    assert (
+        "meso12-network: meso12 near equilibrium" in told
+        and "In 2.4 % both are the same: no loads help." in told
+    )
+    assert "the same" not in network_words(
+        summary(taken) | {"results": ["meso12", "meso12-network", "micro"]}
+    )
     assert network_words(summary(GOOD)) == ""
     rows = [
         line for line in results_table(given) if line.strip(" *-").startswith(("meso", "micro"))
@@ -443,6 +448,17 @@ def test_what_is_wrong_with_micro_dvc_is_told_before_other_meshes():
     one = GOOD | {"meso12": found(converged=False), "micro": found(converged=False)}
     told = [line for line in warnings(summary(one)) if "did not end" in line]
     assert ["micro:" in line for line in told] == [True, False]
+
+
+def test_a_network_fit_that_did_not_end_has_a_warning_of_its_own():
+    """None where the displacement is as it was: its mesh has one then."""
+    lost = found(converged=False) | {"weight": 1e5}
+    names = {"results": ["meso12", "meso12-network", "micro"]}
+    told = " ".join(warnings(summary(GOOD | {"meso12-network": lost}) | names))
+    assert "meso12-network: the loop did not end" in told and "starts from meso12" in told
+    same = found(converged=False) | {"refused": "no loads help"}
+    told = " ".join(warnings(summary(GOOD | {"meso12-network": same}) | names))
+    assert "did not end" not in told
 
 
 def test_a_meso_loop_that_did_not_end_has_a_warning():

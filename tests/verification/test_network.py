@@ -1,5 +1,6 @@
 """What struts in equilibrium make of a coarse displacement, and when the images take it."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -7,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from addvc.correlation import frame_fit
 from addvc.correlation.meso import MesoOptions, meso_system
-from addvc.correlation.network import REFUSALS, network_fit
-from addvc.correlation.network_risk import images_of
+from addvc.correlation.network import REFUSALS, network_fit, refusal
+from addvc.correlation.network_risk import risk_data
 from addvc.correlation.register import Stop, register
 from addvc.correlation.transfer import transfer_matrix
 from addvc.correlation.uncertainty import Noise
@@ -69,7 +71,7 @@ def registered(meso, still, deformed):
     """What meso DVC finds from rest, and what it is judged by."""
     mesh, system, micro = meso
     solution = register(system, deformed, np.zeros_like(mesh.points), Stop(2e-3, 100))
-    return solution, images_of(micro, 0, [still, deformed], system, None, Noise(NOISE, 0.0))
+    return solution, risk_data(micro, 0, [still, deformed], system, None, Noise(NOISE, 0.0))
 
 
 def errors(meso, truth, *fields):
@@ -143,7 +145,7 @@ def test_noise_that_the_residual_does_not_hold_is_none(meso, still):
     shares = []
     for times in (1, 10):
         noise = Noise(times * NOISE, 0.0)
-        judge = images_of(micro, 0, [still, deformed], system, None, noise)
+        judge = risk_data(micro, 0, [still, deformed], system, None, noise)
         into, _ = transfer_matrix(mesh, judge.reference.quadrature.points)
         answers = np.stack([into @ one for one in judge.answers])
         shares.append(judge.share(into @ solution.u, answers))
@@ -167,3 +169,30 @@ def test_risks_differ_as_the_errors_do(meso, still):
     errors_, risks = np.array(differences).T
     assert (errors_ > 0).all()
     assert risks.mean() == pytest.approx(errors_.mean(), rel=0.3)
+
+
+@pytest.mark.parametrize("scale", [None, 30.0])
+def test_what_is_taken_has_less_risk_than_what_was_there(meso, held, still, scale):
+    """With a robust residual too: a strut that it lost costs less then."""
+    mesh, system, micro = meso
+    deformed = noisy(back, 33)
+    solution = register(system, deformed, np.zeros_like(mesh.points), Stop(2e-3, 100))
+    data = risk_data(micro, 0, [still, deformed], system, scale, Noise(NOISE, 0.0))
+    _, notes = network_fit(held, mesh, solution, data, NU)
+    assert notes["refused"] is None and notes["least"] < notes["before"]
+    assert notes["before"] == notes["trials"][0]["risk"]
+
+
+@pytest.mark.parametrize("solver", [None, lambda b: np.full_like(b, np.nan)])
+def test_a_frame_that_cannot_be_solved_leaves_all_as_it_is(meso, held, still, solver, monkeypatch):
+    solution, data = registered(meso, still, noisy(back, 31))
+    monkeypatch.setattr(frame_fit, "solver_or_none", lambda matrix: solver)
+    found, notes = network_fit(held, meso[0], solution, data, NU)
+    assert found is solution and notes["refused"] == "unsolved" and "Fig. 10" in refusal(notes)
+
+
+def test_every_refusal_says_what_was_wrong():
+    numbers = {"nodes": 7, "near": 3, "least": 2.5, "before": 2.25}
+    for key in REFUSALS:
+        assert re.search(r"\d", refusal({"refused": key} | numbers))
+    assert refusal({"refused": None}) is None and refusal({}) is None

@@ -467,7 +467,7 @@ APART = [
 UNUSED = [
     *([] if FREEFORM else ["freeform"]),
     *([] if EQUILIBRIUM or NETWORK else ["strut_frame"]),
-    *([] if NETWORK else ["network"]),
+    *([] if NETWORK else ["network", "transfer_network"]),
     *([] if HAS_TRUTH else ["truth_error"]),
     *([] if "height" in config["micro"]["region"] else ["meso_profile"]),
 ]
@@ -528,7 +528,7 @@ rule summary:
         states=LABELS,
         scope={
             "meshes": [*MESO, *MICRO],
-            "network": NETWORK,
+            "results": RESULTS,
             "methods": METHODS,
             "region": config["micro"]["region"] or "all",
             "finest": FINEST,

@@ -160,7 +160,6 @@ if NETWORK:
         params:
             code=code("meso/network.py"),
             meso=section("meso", "l_l", "tolerance", "max_iterations", "clear"),
-            coarsest=len(MESO) == 1,
             blur=config["images"]["blur"],
             micro=section("micro", "nu", "robust"),
             axis=AXIS,

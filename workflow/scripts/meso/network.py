@@ -6,7 +6,7 @@ from addvc.runtime import job
 from addvc.correlation.meso import meso_options, meso_system
 from addvc.correlation.micro import robust_scale
 from addvc.correlation.network import network_fit
-from addvc.correlation.network_risk import images_of
+from addvc.correlation.network_risk import risk_data
 from addvc.correlation.store import load_solution, save_solution
 from addvc.correlation.uncertainty import Noise
 from addvc.fem.io import read_mesh
@@ -21,10 +21,10 @@ with job(snakemake):
     mesh, levels = read_mesh(source.mesh), read_json(source.threshold)
     solution, found = load_solution(source.solution)
     size = read_json(source.figures)["mean_edge"]
-    options = meso_options(params.meso, size, params.axis, params.coarsest, degree)
+    options = meso_options(params.meso, size, params.axis, False, degree)
     system = meso_system(mesh, reference, replace(options, cutoff=found["l_l"]))
     noise, scale = Noise(levels["noise"], params.blur), robust_scale(params.micro["robust"], levels)
     frame, micro = load_frame(source.frame), read_mesh(source.micro)
-    judge = images_of(micro, len(frame.frame.points), images, system, scale, noise)
-    solution, notes = network_fit(frame, mesh, solution, judge, params.micro["nu"])
+    data = risk_data(micro, len(frame.frame.points), images, system, scale, noise)
+    solution, notes = network_fit(frame, mesh, solution, data, params.micro["nu"])
     save_solution(snakemake.output[0], solution, mesh, l_l=found["l_l"], **notes)

@@ -29,6 +29,9 @@ HEADERS = {".mhd": META_DATA, ".mha": META_DATA, ".nhdr": NRRD_DATA, ".nrrd": NR
 HEADER_BYTES = 2**15
 """How far a header goes, at most."""
 
+NETWORK = "-network"
+"""Ending of the result that a network fit makes of a mesh."""
+
 DEMO = "twin"  # the case that the default configuration has
 TWIN_VOXEL_UM = 20.01  # the binned image of the paper: 3 x 6.67
 TWIN_SIZES = {
@@ -170,7 +173,7 @@ def network_names(config: dict) -> list[str]:
     """`meso12-network`, the finest meso result near equilibrium of the frame of struts, where it is
     asked for; none of virtual tests, whose waves are in no equilibrium."""
     wanted = config["meso"]["network"] and case_kind(config) != "virtual"
-    return [f"{meso_names(config)[-1]}-network"] if wanted else []
+    return [meso_names(config)[-1] + NETWORK] if wanted else []
 
 
 def meso_size(config: dict, name: str, cell_size: float) -> float:

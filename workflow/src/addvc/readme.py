@@ -16,9 +16,10 @@ from addvc.images.files import atomic_path, read_json
 
 TWIN = ("twin_foam", "twin_mechanics", "twin_scan")
 GEOMETRY = ("check_input", "volume", "smooth", "specimen", "cell_size", "threshold", "solid", "surface",
-            "micro_mesh", "meso_mesh", "platen_grid", "penalised_nodes", "shell")  # fmt: skip
+            "micro_mesh", "meso_mesh", "platen_grid", "penalised_nodes", "shell",
+            "strut_frame")  # fmt: skip
 MESO = ("start", "freeform", "freeform_step", "best_start", "meso_dvc")
-NETWORK = ("strut_frame", "network", "transfer_network")
+NETWORK = ("network", "transfer_network")
 MICRO = ("transfer", "field_on_micro", "micro_start", "factor", "micro_dvc")
 STAGES = {
     "twin and its scans": TWIN,
@@ -41,11 +42,12 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 def accuracy(summary: dict, peers: Sequence[dict] = ()) -> str:
     """rms and 95th percentile of the error of each result and state, voxels; `peers`: rows of the
     benchmarks (state, tool, rms, p95), of which other tools than addvc's are taken."""
-    states, meshes = summary["states"], list(summary["meshes"])
-    first = next(n for n, name in enumerate(meshes) if name.startswith("micro"))
-    names = [*meshes[:first], *summary["network"], *meshes[first:]]
+    states = summary["states"]
     head = ["Error, voxels: rms / 95th percentile", *(state["label"] for state in states)]
-    body = [[f"`{name}`", *(error_words(state[name]) for state in states)] for name in names]
+    body = [
+        [f"`{name}`", *(error_words(state[name]) for state in states)]
+        for name in summary["results"]
+    ]
     return table([head, *body, *peer_rows(peers, [state["state"] for state in states])])
 
 

@@ -84,8 +84,8 @@ class Fit:
 def judged(problem: Problem, motion: FrameMotion, weight: float, draws: np.ndarray) -> Fit | None:
     """The fit with what the filter does to draws (d, k, 3) of the noise, not all of them zero; None
     where the matrix is not positive definite."""
-    matrix, _, slopes, _ = problem.system(motion, weight)
-    solve = solver_or_none(matrix)
+    step = problem.step(motion, weight)
+    solve, slopes = solver_or_none(step.matrix), step.slopes
     if solve is None:
         return None
     left, noise = filtered(solve, slopes, draws), mean_square(draws)

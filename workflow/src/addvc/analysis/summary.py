@@ -15,6 +15,7 @@ from addvc.analysis.platens_check import beside
 from addvc.analysis.strut_table import RAW
 from addvc.analysis.validity import verdict
 from addvc.correlation.cutoff import Ladder
+from addvc.correlation.network import refusal
 from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_vtu
 from addvc.images.files import read_json
@@ -44,14 +45,14 @@ WARNED = re.compile(r"^\S+ \[([^]]+)\] WARNING: (.+)$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Scope:
-    """What there is to sum up: results from meso to micro, the network fit where there is one, the
-    method of each micro result, the finest meso mesh, the loading axis, `micro.region`, whether there is
-    a truth and a free-form start, the pre-filter (voxels) and the binning of scans, rules whose cost
-    does not count, and whose warnings, since they may run before or after, or are no part of this
-    configuration."""
+    """What there is to sum up: what has a mesh of its own or a method, coarse to fine, the same with the
+    network fit where there is one, the method of each micro result, the finest meso mesh, the loading
+    axis, `micro.region`, whether there is a truth and a free-form start, the pre-filter (voxels) and the
+    binning of scans, rules whose cost does not count, and whose warnings, since they may run before or
+    after, or are no part of this configuration."""
 
     meshes: list[str]
-    network: list[str]
+    results: list[str]
     methods: dict[str, str]
     region: str | dict
     finest: str
@@ -71,7 +72,7 @@ def summarise(case: str, folder: str | Path, states: dict[int, str], scope: Scop
     return {
         "case": case,
         "methods": scope.methods,
-        "network": scope.network,
+        "results": scope.results,
         "region": None if scope.region == "all" else read("geometry/region.json"),
         "cell_size": read("geometry/cell_size.json")["cell_size"],
         "threshold": threshold["threshold"],
@@ -135,8 +136,7 @@ def state_figures(folder: Path, state: int, scope: Scope) -> dict:
     """Verdict, figures of each mesh, and strain between the valid nodes of the finest meso mesh,
     along the loading axis and each other one; the platens beside its ends."""
     micro, axis = next(mesh for mesh in scope.meshes if mesh.startswith("micro")), scope.axis
-    names = [*scope.meshes, *scope.network]
-    result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in names}
+    result = {mesh: result_figures(folder, mesh, state, scope.truth) for mesh in scope.results}
     points, _, point, _ = read_vtu(folder / f"fields/{scope.finest}_state{state}.vtu")
     trusted = point["valid"] > 0 if point["valid"].mean() > 0.5 else slice(None)
     along = [(points[trusted, d], point["displacement"][trusted, d]) for d in range(3)]
@@ -186,7 +186,7 @@ def result_figures(folder: Path, mesh: str, state: int, truth: bool) -> dict:
         "torn": notes.get("torn", []),
         "l_l": notes.get("l_l"),
         "weight": notes.get("weight"),
-        "refused": notes.get("refused"),
+        "refused": refusal(notes),
         "converged": solution.converged,
         "iterations": solution.iterations,
         "last_step": solution.history[-1],

@@ -16,14 +16,14 @@ Errors on the default twin, voxels rms, of meso 12 / so fitted / of the best fie
 """
 
 import logging
-from collections.abc import Callable
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from addvc.correlation.frame_fit import HELD, Approach, Problem, approached
 from addvc.correlation.gauss_newton import Solution
-from addvc.correlation.network_risk import Images
+from addvc.correlation.network_risk import RiskData
 from addvc.correlation.transfer import Projection
 from addvc.fem.carried import NEAR, Attached, first_motion
 from addvc.fem.frame import FrameMotion
@@ -36,8 +36,11 @@ APPROACH = ((0.0, 1e-1), (1e1, 1e-2), (1e2, 1e-3), (1e3, 1e-4))
 """Weights of equilibrium and of the elastic energy on the way: where struts are in a wrong place an
 early equilibrium would be that of a crumpled frame."""
 
-WEIGHTS, BETWEEN = (1e3, 1e4, 1e5, 1e6), 10**0.5
-"""Tried until the risk rises, then on either side of the best. The risk is flat about its least."""
+FIRST, LEAST, MOST = 1e3, 1e0, 1e7
+"""Weights are tried by tens upwards, or else downwards, as long as the risk falls."""
+
+BETWEEN = 10**0.5
+"""Then on either side of the best: the risk is flat about its least."""
 
 ROUND, FINALLY = 4, 30
 """Iterations with each weight, and with the one that is taken, at most. More on the way lead, where
@@ -52,12 +55,21 @@ HOLD = 1e-3
 hardly any solid around them."""
 
 REFUSALS = {
-    "clamped": "no node of the frame of struts is free of loads from outside",
-    "unseen": f"fewer than {NEAR} points of the micro mesh are near the frame of struts",
-    "unsolved": "no motion of the frame of struts was found",
-    "risk": "no weight of equilibrium has a smaller risk than the displacement as it is",
+    "clamped": "all {nodes} nodes of the frame of struts may be loaded from outside (at least one must "
+    "not), so that nothing is in equilibrium; widen micro.region",
+    "unseen": f"{{near}} points of the micro mesh (at least {NEAR}) are near the frame of struts, which "
+    "has {nodes} nodes; see Fig. 8 for what the threshold keeps, and widen micro.region",
+    "unsolved": "no motion of the frame of struts, of {nodes} nodes, follows it; see Fig. 10 for where "
+    "it is far off",
+    "risk": "with the best weight of equilibrium the risk is {least:.3g} grey levels^2, {before:.3g} "
+    "without (it must be less), so that struts do not move as an elastic frame would",
 }
 """Why the displacement stays as it is."""
+
+
+def refusal(notes: dict) -> str | None:
+    """Why the displacement is as it was, from the notes of `network_fit`; None where it is not."""
+    return REFUSALS[notes["refused"]].format(**notes) if notes.get("refused") else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,100 +85,133 @@ class Trial:
         return self.row["risk"]
 
 
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What weights are tried on: the displacement u (Q, 3) of points, of which the frame of the problem
+    carries some, `near` (Q,); what noise makes of it, answers (d, Q, 3); the images that judge it, and
+    the share of the draws that is noise."""
+
+    problem: Problem
+    near: np.ndarray
+    u: np.ndarray
+    answers: np.ndarray
+    data: RiskData
+    share: float
+
+    def before(self) -> dict:
+        """The risk of the displacement as it is."""
+        return {"weight": 0.0} | self.data.risk(self.u, self.answers, self.share)
+
+    def change(self, motion: FrameMotion) -> np.ndarray:
+        """What a motion of the frame adds to u, (Q, 3)."""
+        change = np.zeros_like(self.u)
+        change[self.near] = self.problem.attached.moved(motion) - self.problem.now
+        return change
+
+    def trial(self, weight: float, motion: FrameMotion, iterations: int = ROUND) -> Trial | None:
+        """A weight from a motion; None where no other motion is found."""
+        found = approached(self.problem, motion, weight, HELD, iterations)
+        if found is None:
+            return None
+        answers = self.answers.copy()
+        answers[:, self.near] = found.kept(self.answers[:, self.near])
+        moved = self.u + self.change(found.motion)
+        return Trial(weight, found, {"weight": weight} | self.data.risk(moved, answers, self.share))
+
+
 def network_fit(
-    held: StrutFrame, mesh: Mesh, solution: Solution, images: Images, nu: float
+    frame: StrutFrame, mesh: Mesh, solution: Solution, data: RiskData, nu: float
 ) -> tuple[Solution, dict]:
     """What meso DVC has found on the mesh as the frame would do it, and notes: the weight, and the risk
     of each that was tried and of the displacement as it was (weight 0). That stays where the weight is
     None: `refused`, a key of REFUSALS, says why. nu: Poisson's ratio."""
-    q = images.reference.quadrature
-    attached = Attached.of(held.frame, q.points) if len(held.frame.pieces) else None
-    refused = obstacle(held, attached)
+    started, q = time.perf_counter(), data.reference.quadrature
+    attached = Attached.of(frame.frame, q.points) if len(frame.frame.pieces) else None
+    near = np.zeros(len(q), bool) if attached is None else attached.within
+    notes = {"nodes": len(frame.frame.points), "near": int(near.sum()), "trials": []}
+    refused = obstacle(frame, near)
     if refused is not None:
-        return as_it_was(solution, refused, [])
-    project = Projection(mesh, q.points, q.weight, HOLD)
-    u, near = project.at_points @ solution.u, attached.within
-    reach = REACH * float(np.median(held.frame.radius))
-    problem = Problem(held, attached[near], (q.points + u)[near], nu, reach)
-    answers = np.stack([project.at_points @ one for one in images.answers])
-    share = images.share(u, answers)
-    trial = trial_of(problem, near, u, answers, lambda *given: images.risk(*given, share))
-    trials = searched(problem, first_motion(held.frame, q.points[near], u[near]), trial)
-    before = {"weight": 0.0} | images.risk(u, answers, share)
+        return as_it_was(solution, notes | {"refused": refused})
+    project = Projection(mesh, q.points, q.weight, HOLD, change=True)
+    task = task_of(frame, attached, project, solution, data, nu)
+    trials = searched(task, first_motion(frame.frame, q.points[near], task.u[near]))
+    best, before = min(trials, key=lambda one: one.risk, default=None), task.before()
     rows = [before, *(one.row for one in sorted(trials, key=lambda one: one.weight))]
-    best = min(trials, key=lambda one: one.risk, default=None)
-    if best is None or best.risk >= before["risk"]:
-        return as_it_was(solution, "unsolved" if best is None else "risk", rows)
-    best = trial(best.weight, best.found.motion, FINALLY) or best
+    notes |= {"trials": rows, "before": before["risk"], "least": best and best.risk}
+    if best is None or not best.risk < before["risk"]:
+        return as_it_was(solution, notes | {"refused": "unsolved" if best is None else "risk"})
+    last = task.trial(best.weight, best.found.motion, FINALLY)
+    best = last if last is not None and last.risk < before["risk"] else best
     log.info("weight %.3g: risk %.4f, %.4f without", best.weight, best.risk, before["risk"])
-    change = np.zeros_like(u)
-    change[near] = problem.attached.moved(best.found.motion) - problem.now
-    moved = solution.u + project.nodal_change(change)
-    notes = {"weight": best.weight, "trials": rows, "refused": None}
-    return carried_over(solution, moved, best, images.left(project.at_points @ moved)), notes
+    u = solution.u + project.nodal(task.change(best.found.motion))
+    found = replace(
+        solution,
+        u=u,
+        history=[step for one in [*trials, best] for step in one.found.steps],
+        converged=solution.converged and best.found.settled,
+        seconds=time.perf_counter() - started,
+        residual=data.residual(project.at_points @ u),
+    )
+    return found, notes | {"weight": best.weight, "refused": None}
 
 
-def carried_over(solution: Solution, u: np.ndarray, best: Trial, residual: dict) -> Solution:
-    """The solution with u (n, 3), as the frame would have it; it has converged where both have."""
-    both = solution.converged and best.found.settled
-    return replace(solution, u=u, history=best.found.steps, converged=both, residual=residual)
+def task_of(
+    frame: StrutFrame,
+    attached: Attached,
+    project: Projection,
+    solution: Solution,
+    data: RiskData,
+    nu: float,
+) -> Task:
+    """What weights are tried on, from what meso DVC has found."""
+    u, near = project.at_points @ solution.u, attached.within
+    answers = np.stack([project.at_points @ one for one in data.answers])
+    now = (data.reference.quadrature.points + u)[near]
+    problem = Problem(frame, attached[near], now, nu, REACH * float(np.median(frame.frame.radius)))
+    return Task(problem, near, u, answers, data, data.share(u, answers))
 
 
-def obstacle(held: StrutFrame, attached: Attached | None) -> str | None:
+def obstacle(frame: StrutFrame, near: np.ndarray) -> str | None:
     """What keeps the fit from being tried: a key of REFUSALS, None for nothing."""
-    if attached is None or attached.within.sum() < NEAR:
+    if near.sum() < NEAR:
         return "unseen"
-    return "clamped" if held.loaded[held.frame.pieces].all() else None
+    return "clamped" if frame.loaded[frame.frame.pieces].all() else None
 
 
-def as_it_was(solution: Solution, refused: str, rows: list[dict]) -> tuple[Solution, dict]:
-    """The solution, with the notes that say so."""
-    log.info("the displacement stays as it is: %s", REFUSALS[refused])
-    return solution, {"weight": None, "trials": rows, "refused": refused}
+def as_it_was(solution: Solution, notes: dict) -> tuple[Solution, dict]:
+    """The solution, with the notes that say why."""
+    log.info("the displacement stays as it is: %s", refusal(notes))
+    return solution, notes | {"weight": None}
 
 
-TrialOf = Callable[..., Trial | None]
-
-
-def trial_of(
-    problem: Problem,
-    near: np.ndarray,
-    u: np.ndarray,
-    answers: np.ndarray,
-    risk: Callable[[np.ndarray, np.ndarray], dict],
-) -> TrialOf:
-    """Tries a weight from a motion, of points `near` (Q,) the frame and others as displaced by u (Q, 3)
-    with answers (d, Q, 3) to noise; None where a matrix is not positive definite."""
-
-    def trial(weight: float, motion: FrameMotion, iterations: int = ROUND) -> Trial | None:
-        found = approached(problem, motion, weight, HELD, iterations)
-        if found is None:
-            return None
-        moved, changed = u.copy(), answers.copy()
-        moved[near] += problem.attached.moved(found.motion) - problem.now
-        changed[:, near] = found.left(answers[:, near])
-        return Trial(weight, found, {"weight": weight} | risk(moved, changed))
-
-    return trial
-
-
-def searched(problem: Problem, motion: FrameMotion, trial: TrialOf) -> list[Trial]:
-    """The trials of weights, from the first motion of the frame."""
-    for weight, held in APPROACH:
-        found = approached(problem, motion, weight, held, ROUND)
+def searched(task: Task, motion: FrameMotion) -> list[Trial]:
+    """The trials of weights, from the first motion of the frame; none where it cannot be solved."""
+    for weight, elastic in APPROACH:
+        found = approached(task.problem, motion, weight, elastic, ROUND)
         if found is None:
             return []
         motion = found.motion
-    trials = []
-    for weight in WEIGHTS:
-        one = trial(weight, trials[-1].found.motion if trials else motion)
+    first = task.trial(FIRST, motion)
+    if first is None:
+        return []
+    trials = downhill(task, first, 10.0)
+    if min(trials, key=lambda one: one.risk) is first:
+        trials += downhill(task, first, 0.1)[1:]
+    best = min(trials, key=lambda one: one.risk)
+    beside = (
+        task.trial(best.weight * times, best.found.motion) for times in (1 / BETWEEN, BETWEEN)
+    )
+    return trials + [one for one in beside if one is not None]
+
+
+def downhill(task: Task, first: Trial, times: float) -> list[Trial]:
+    """The first trial and those with `times` the weight of the one before, as long as the risk falls."""
+    trials = [first]
+    while LEAST <= trials[-1].weight * times * (1 + 1e-9) <= MOST * (1 + 1e-6):
+        one = task.trial(trials[-1].weight * times, trials[-1].found.motion)
         if one is None:
             break
         trials.append(one)
-        if len(trials) > 1 and one.risk > trials[-2].risk:
+        if not one.risk < trials[-2].risk:
             break
-    if trials:
-        best = min(trials, key=lambda one: one.risk)
-        beside = (trial(best.weight * times, best.found.motion) for times in (1 / BETWEEN, BETWEEN))
-        trials += [one for one in beside if one is not None]
     return trials

@@ -15,6 +15,7 @@ import numpy as np
 
 from addvc.correlation.metric import (
     Reference,
+    geman_mcclure,
     reference_on,
     residual_at,
     residual_statistics,
@@ -35,7 +36,7 @@ DRAWS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Images:
+class RiskData:
     """I_r at points (Q,) of the struts, I_d by its spline coefficients (nx, ny, nz), the scale of the
     residuals (grey levels; None: plain squares), and draws of the noise: residuals (d, Q) with the
     displacements (d, n, 3) that meso DVC makes of them."""
@@ -46,12 +47,13 @@ class Images:
     noise: np.ndarray
     answers: np.ndarray
 
-    def misfit(self, u: np.ndarray) -> float:
-        """Mean of rho(r) under u (Q, 3), grey levels^2. A point outside of I_d costs as much as one on a
-        wrong strut."""
+    def fit(self, u: np.ndarray) -> tuple[float, np.ndarray]:
+        """Mean of rho(r) under u (Q, 3), grey levels^2, and how much each point counts in it (Q,): one
+        outside of I_d costs as much as one on a wrong strut, whatever the noise."""
         r, inside = residual_at(self.reference, self.deformed, u)
         worst = self.scale**2 if self.scale is not None else np.ptp(self.reference.grey) ** 2
-        return self.mean(np.where(inside, robust_square(r, self.scale), worst))
+        trust = np.ones(len(r)) if self.scale is None else geman_mcclure(r, self.scale)
+        return self.mean(np.where(inside, robust_square(r, self.scale), worst)), inside * trust
 
     def mean(self, values: np.ndarray) -> float:
         """Of values (..., Q), weighted."""
@@ -66,29 +68,29 @@ class Images:
         """Of the variance of the draws, what is noise: no more than leaves, after answers (d, Q, 3),
         what there is under u (Q, 3). Texture of a void that is not empty moves with the solid."""
         left = self.mean((self.noise - self.along(answers)) ** 2)
-        return min(1.0, self.misfit(u) / left) if left > 0 else 1.0
+        return min(1.0, self.fit(u)[0] / left) if left > 0 else 1.0
 
     def risk(self, u: np.ndarray, answers: np.ndarray, share: float) -> dict:
         """Risk of displacements u (Q, 3) that noise changes by answers (d, Q, 3), grey levels^2, less
         its constant, and its two parts."""
-        fit = self.misfit(u)
-        freedom = 2 * share * self.mean(self.noise * self.along(answers))
+        fit, trust = self.fit(u)
+        freedom = 2 * share * self.mean(trust * self.noise * self.along(answers))
         return {"risk": fit + freedom, "misfit": fit, "freedom": freedom}
 
-    def left(self, u: np.ndarray) -> dict:
+    def residual(self, u: np.ndarray) -> dict:
         """Statistics of the residual under u (Q, 3)."""
         r, inside = residual_at(self.reference, self.deformed, u)
         return residual_statistics(r, inside, self.reference.quadrature.weight)
 
 
-def images_of(
+def risk_data(
     micro: Mesh,
     nodes: int,
     images: list[np.ndarray],
     system: System,
     scale: float | None,
     noise: Noise,
-) -> Images:
+) -> RiskData:
     """What a displacement by the `system` of meso DVC is judged by, of [I_r, I_d] by their spline
     coefficients with the noise of each, in the middle of some tetrahedra of the micro mesh, for a frame
     of so many nodes."""
@@ -97,9 +99,9 @@ def images_of(
     reference = reference_on(micro, middles, images[0], degree)
     rng, residuals, answers = np.random.default_rng(SEED), [], []
     for _ in range(DRAWS):
-        volume = np.sqrt(2) * noise.volume(images[0].shape, rng)
-        r = spline_value(volume, system.reference.quadrature.points, degree)[0]
+        volume = noise.volume(images[0].shape, rng)  # that of both images: sqrt(2) of it
+        r = np.sqrt(2) * spline_value(volume, system.reference.quadrature.points, degree)[0]
         right = right_hand_side(system.reference, np.where(system.reference.inside, r, 0))
         answers.append(system.factor.solve(right).reshape(-1, 3))
-        residuals.append(spline_value(volume, reference.quadrature.points, degree)[0])
-    return Images(reference, images[1], scale, np.stack(residuals), np.stack(answers))
+        residuals.append(np.sqrt(2) * spline_value(volume, reference.quadrature.points, degree)[0])
+    return RiskData(reference, images[1], scale, np.stack(residuals), np.stack(answers))

@@ -67,22 +67,30 @@ def lattice_matrix(lines: list[np.ndarray], mesh: Mesh, points: np.ndarray) -> s
 
 class Projection:
     """Back to a mesh: the field of it that is nearest to displacements at points (Q, 3) with weights
-    (Q,), in the sense of least squares. `at_points` (Q, n) goes from its nodes to the points."""
+    (Q,), in the sense of least squares. `at_points` (Q, n) goes from its nodes to the points.
 
-    def __init__(self, mesh: Mesh, points: np.ndarray, weight: np.ndarray, hold: float = HOLD):
+    Nodes whose cells have no point carry on smoothly what is around them or, of a `change`, are zero."""
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        points: np.ndarray,
+        weight: np.ndarray,
+        hold: float = HOLD,
+        change: bool = False,
+    ):
         from sksparse.cholmod import cholesky
 
         self.at_points, _ = transfer_matrix(mesh, points)
-        self._weighted = self.at_points.T @ sparse.diags(weight)
-        mass, stiff = self._weighted @ self.at_points, laplacian(mesh)
+        self._free = self.at_points.getnnz(axis=0) > 0 if change else slice(None)
+        self._weighted = (self.at_points.T @ sparse.diags(weight)).tocsr()[self._free]
+        mass = self._weighted @ self.at_points[:, self._free]
+        stiff = laplacian(mesh).tocsr()[self._free][:, self._free]
         scale = hold * mass.diagonal().mean() / stiff.diagonal().mean()
         self._solve = cholesky((mass + scale * stiff).tocsc())
 
     def nodal(self, u: np.ndarray) -> np.ndarray:
-        """u (Q, 3) -> (n, 3) at the nodes; what no point is near to is carried on smoothly."""
-        return self._solve(self._weighted @ u)
-
-    def nodal_change(self, u: np.ndarray) -> np.ndarray:
-        """The same of a change u (Q, 3), zero at nodes whose cells have no point."""
-        touched = self.at_points.getnnz(axis=0) > 0
-        return self.nodal(u) * touched[:, None]
+        """u (Q, 3) -> (n, 3) at the nodes."""
+        found = np.zeros((self.at_points.shape[1], 3))
+        found[self._free] = self._solve(self._weighted @ u)
+        return found

@@ -38,10 +38,13 @@ def gauss_points(mesh: Mesh, per_tet: int = 4) -> Quadrature:
 
 
 def thinned(quadrature: Quadrature, most: int) -> Quadrature:
-    """One in so many points that about `most` are left, each with the weight of all that it is for."""
+    """One in so many points that about `most` are left; the sum of the weights stays what it is."""
     stride = max(1, round(len(quadrature) / most))
-    some = (part[::stride] for part in (quadrature.cell, quadrature.shape, quadrature.points))
-    return Quadrature(*some, stride * quadrature.weight[::stride])
+    cell, shape, points, weight = (
+        part[::stride]
+        for part in (quadrature.cell, quadrature.shape, quadrature.points, quadrature.weight)
+    )
+    return Quadrature(cell, shape, points, weight * (quadrature.weight.sum() / weight.sum()))
 
 
 def voxel_points(

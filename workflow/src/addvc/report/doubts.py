@@ -134,25 +134,30 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
     found += fold_warnings(state, summary) + torn_warnings(state, micro)
     found += equilibrium_warnings(state) + residual_warnings(state, micro)
     found += noise_warnings(state, micro)
-    others = (mesh for mesh in summary["meshes"] if mesh != micro)
-    return found + [line for mesh in others for line in loop_warnings(state, mesh)]
+    others = (name for name in summary["results"] if name != micro)
+    return found + [line for name in others for line in loop_warnings(state, name)]
 
 
 def loop_warnings(state: dict, mesh: str) -> list[str]:
     """One line where the loop of a mesh did not end by its criterion."""
     one = state[mesh]
-    if one["converged"]:
+    if one["converged"] or one["refused"]:
         return []
+    remedy = (
+        f"It starts from {mesh.split('-')[0]}, which may be far off (Fig. 10); nothing else uses it."
+        if one["weight"]
+        else "Look at the residual maps (Fig. 13); a longer regularisation length or a better start "
+        "may help."
+    )
     return [
         f"- State {state['state']}, {mesh}: the loop did not end, after {one['iterations']} iterations "
-        f"in all (last rms(du) {figure(one['last_step'], '.1e')} voxel). Look at the residual maps "
-        "(Fig. 13); a longer regularisation length or a better start may help."
+        f"in all (last rms(du) {figure(one['last_step'], '.1e')} voxel). {remedy}"
     ]
 
 
 def fold_warnings(state: dict, summary: dict) -> list[str]:
     """One line where a displacement turns more than a few elements of a mesh inside out."""
-    shares = {mesh: state[mesh].get("inverted") or 0.0 for mesh in summary["meshes"]}
+    shares = {mesh: state[mesh].get("inverted") or 0.0 for mesh in summary["results"]}
     folded = [f"{mesh} {share:.1%}" for mesh, share in shares.items() if share > FOLDED]
     if not folded:
         return []

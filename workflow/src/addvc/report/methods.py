@@ -6,6 +6,7 @@ from addvc.config import METHODS, case_kind, chooses, loading_axis, micro_names,
 from addvc.correlation.micro import MicroOptions, micro_options, turns
 from addvc.errors import grey_words
 from addvc.report import style
+from addvc.report.page_tables import network_name
 from addvc.report.references import Citations
 
 STARTS = {
@@ -110,17 +111,17 @@ def meso(summary: dict, config: dict) -> str:
         "Each loading state was registered with the reference by finite-element DVC {dvc} on "
         f"tetrahedra with a mean edge of {edges} voxels, coarse to fine{clear}, from the start of least "
         f"residual: {starts}, each rescaled in a reduced basis on the coarsest mesh {{addvc}}; "
-        f"{on} started from the coarser result{fields}.{network_words(summary)}"
+        f"{on} started from the coarser result{fields}.{equilibrium_fit(summary)}"
     )
 
 
-def network_words(summary: dict) -> str:
+def equilibrium_fit(summary: dict) -> str:
     """The network fit, where it was made."""
-    if not summary["network"]:
+    name = network_name(summary)
+    if name is None or not any(state[name]["weight"] for state in summary["states"]):
         return ""
-    (name,) = summary["network"]
-    helped = any(state[name]["weight"] for state in summary["states"])
-    told = name if helped else f"{name}; none had less risk than no fit"
+    without = [state["label"] for state in summary["states"] if not state[name]["weight"]]
+    told = f"{name}; not in {', '.join(without)}" if without else name
     return (
         " What the finest of these meshes had found was also fitted, robustly {robust}, by motions of "
         "the frame of struts that the reference shows, which hardly need loads between their ends, at "

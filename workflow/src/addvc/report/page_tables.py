@@ -1,5 +1,7 @@
 """Tables of the first page of the report, in reStructuredText."""
 
+from addvc.config import NETWORK
+from addvc.correlation.frame_fit import SETTLED
 from addvc.errors import grey_words
 
 
@@ -13,11 +15,9 @@ def micro_name(summary: dict) -> str:
     return next(mesh for mesh in summary["meshes"] if mesh.startswith("micro"))
 
 
-def results(summary: dict) -> list[str]:
-    """All results, coarse to fine: the network fit, where there is one, is after its meso mesh."""
-    names = list(summary["meshes"])
-    first = names.index(micro_name(summary))
-    return [*names[:first], *summary["network"], *names[first:]]
+def network_name(summary: dict) -> str | None:
+    """The result of the network fit; None where it was not asked for."""
+    return next((name for name in summary["results"] if name.endswith(NETWORK)), None)
 
 
 def list_table(header: list[str], rows: list[list[str]]) -> list[str]:
@@ -39,19 +39,21 @@ RESIDUAL_WORDS = (
 
 
 def network_words(summary: dict) -> str:
-    """What the result of the network fit is, and in which states it is that of its mesh; nothing where
-    it was not asked for."""
-    if not summary["network"]:
+    """What the result of the network fit is, and why it is that of its mesh in some states; nothing
+    where it was not asked for."""
+    name = network_name(summary)
+    if name is None or not summary["states"]:
         return ""
-    (name,) = summary["network"]
-    words = (
+    words = [
         f" {name}: {name.split('-')[0]} near equilibrium of the frame of struts, by as much as the "
-        "images say that it helps."
-    )
-    same = [state["label"] for state in summary["states"] if state[name]["refused"]]
-    return (
-        f"{words} It does not, so that both are the same, in {', '.join(same)}." if same else words
-    )
+        "images say that it helps; with less noise in it, it may leave more of the residual."
+    ]
+    words += [
+        f"In {state['label']} both are the same: {state[name]['refused']}."
+        for state in summary["states"]
+        if state[name]["refused"]
+    ]
+    return " ".join(words)
 
 
 def results_table(summary: dict) -> list[str]:
@@ -62,7 +64,7 @@ def results_table(summary: dict) -> list[str]:
     header += ["error median, voxel", "error p95, voxel", "error rms, voxel"] if known else []
     rows = []
     for state in summary["states"]:
-        for mesh in results(summary):
+        for mesh in summary["results"]:
             error = state[mesh]["error"] or {}
             sigma = state[mesh]["residual_std"], state.get("noise_std")
             row = [state["label"], mesh, *(grey_words(value, 3) for value in sigma)]
@@ -84,7 +86,7 @@ def convergence_table(summary: dict) -> list[str]:
             "yes" if state[mesh]["converged"] else "NO",
         ]
         for state in summary["states"]
-        for mesh in results(summary)
+        for mesh in summary["results"]
     ]
     header = ["state", "start", "mesh", "l_E, l_L (voxel) or w", "iterations"]
     return list_table([*header, "last rms(du), voxel", "converged"], rows)
@@ -100,8 +102,10 @@ def start(state: dict, mesh: str) -> str:
 def convergence_words(summary: dict) -> str:
     """What the lengths of the table are not."""
     words = "The coarsest mesh has no regularisation"
-    if summary["network"]:
-        words += "; w is the weight of equilibrium"
+    if network_name(summary):
+        words += (
+            f"; w is the weight of equilibrium in the network fit, which ends at {SETTLED:g} voxel"
+        )
     if "eq10" in summary["methods"].values():
         words += "; the lengths of eq10, which every state shares, are in Table 2"
     return words + "."
@@ -109,6 +113,8 @@ def convergence_words(summary: dict) -> str:
 
 def cutoff(result: dict) -> str:
     """l_E of a micro result of the default kind, l_L of a meso one, w of a network fit."""
+    if result["refused"]:
+        return "as its mesh"
     if result["weight"]:
         return f"w = {result['weight']:.1e}"
     length = result["l_e"] or result["l_l"]
