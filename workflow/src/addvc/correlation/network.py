@@ -36,8 +36,9 @@ APPROACH = ((0.0, 1e-1), (1e1, 1e-2), (1e2, 1e-3), (1e3, 1e-4))
 """Weights of equilibrium and of the elastic energy on the way: where struts are in a wrong place an
 early equilibrium would be that of a crumpled frame."""
 
-FIRST, LEAST, MOST = 1e3, 1e0, 1e7
-"""Weights are tried by tens upwards, or else downwards, as long as the risk falls."""
+FIRST, LEAST, MOST = 1e3, 1e2, 1e7
+"""Weights are tried by tens upwards, or else downwards, as long as the risk falls; below the least the
+frame follows whatever it is told."""
 
 BETWEEN = 10**0.5
 """Then on either side of the best: the risk is flat about its least."""
