@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
 import meshio
 import numpy as np
 import pytest
@@ -241,6 +242,18 @@ def test_error_of_micro_dvc(summary, figure):
         micro, *others = (state[mesh]["error"][figure] for mesh in ("micro", "micro-eq10", *MESO))
         assert micro <= LARGEST[figure]
         assert micro < min(others)
+
+
+def test_equilibrium_takes_error_off_the_finest_meso_mesh(results, summary):
+    """As the images foresee, which know no truth: the risk is less too."""
+    name = f"{MESO[-1]}-network"
+    assert summary["results"] == [*MESO, name, *MESHES[len(MESO) :]]
+    for state in summary["states"]:
+        network, meso = (state[mesh]["error"]["rms"] for mesh in (name, MESO[-1]))
+        assert state[name]["refused"] is None and network < 0.9 * meso
+        with h5py.File(results / f"dvc/{name}_state{state['state']}.h5") as file:
+            notes = json.loads(file.attrs["notes"])
+        assert notes["least"] < notes["before"]
 
 
 # ---------------------------------------------------------------------------------- reruns

@@ -43,7 +43,7 @@ frame follows whatever it is told."""
 BETWEEN = 10**0.5
 """Then on either side of the best: the risk is flat about its least."""
 
-ROUND, FINALLY = 4, 30
+ROUND, FINALLY = 4, 50
 """Iterations with each weight, and with the one that is taken, at most. More on the way lead, where
 struts are in a wrong place, to the equilibrium of what is wrong (28.5 %: 1.5 in place of .86 voxel)."""
 
