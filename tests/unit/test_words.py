@@ -135,15 +135,15 @@ def test_the_network_fit_has_a_row_beside_its_mesh():
     taken = GOOD | {"meso12-network": found() | fit | {"error": ERROR | {"rms": 0.021}}}
     same = DOUBTFUL | {"meso12-network": found() | {"weight": None, "refused": "no loads help"}}
     given = summary(taken, same) | {"results": ["meso12", "meso12-network", "micro"]}
-    told = network_words(given)
+    told = "\n".join(network_words(given))
     assert (
         "meso12-network: meso12 near equilibrium" in told
-        and "In 2.4 % both are the same: no loads help." in told
+        and "- 2.4 %: a copy, since no loads help." in told
     )
     assert "the same" not in network_words(
         summary(taken) | {"results": ["meso12", "meso12-network", "micro"]}
     )
-    assert network_words(summary(GOOD)) == ""
+    assert network_words(summary(GOOD)) == []
     rows = [
         line for line in results_table(given) if line.strip(" *-").startswith(("meso", "micro"))
     ]
@@ -459,6 +459,21 @@ def test_a_network_fit_that_did_not_end_has_a_warning_of_its_own():
     same = found(converged=False) | {"refused": "no loads help"}
     told = " ".join(warnings(summary(GOOD | {"meso12-network": same}) | names))
     assert "did not end" not in told
+
+
+@pytest.mark.parametrize(
+    ("weight", "refused", "warned"), [(1e4, "x", True), (1e4, None, False), (None, "x", False)]
+)
+def test_struts_in_an_equilibrium_that_the_images_do_not_show_have_a_warning(
+    weight, refused, warned
+):
+    one = GOOD | {
+        "meso12-network": found() | {"refused": refused},
+        "equilibrium": {"weight": weight, "refused": None},
+    }
+    names = {"results": ["meso12", "meso12-network", "micro"]}
+    told = " ".join(warnings(summary(one) | names))
+    assert ("Compare the columns `_raw`" in told) == warned
 
 
 def test_a_meso_loop_that_did_not_end_has_a_warning():

@@ -62,8 +62,8 @@ REFUSALS = {
     "has {nodes} nodes; see Fig. 8 for what the threshold keeps, and widen micro.region",
     "unsolved": "no motion of the frame of struts, of {nodes} nodes, follows it; see Fig. 10 for where "
     "it is far off",
-    "risk": "with the best weight of equilibrium the risk is {least:.3g} grey levels^2, {before:.3g} "
-    "without (it must be less), so that struts do not move as an elastic frame would",
+    "risk": "with the best weight of equilibrium the risk is {least:.4g} grey levels^2, {before:.4g} "
+    "without (it must be less), so that the images do not show that it helps",
 }
 """Why the displacement stays as it is."""
 

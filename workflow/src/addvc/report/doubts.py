@@ -6,7 +6,7 @@ from addvc.analysis.balance import refusal
 from addvc.config import METHODS
 from addvc.errors import grey_words
 from addvc.report.case import FOLDED
-from addvc.report.page_tables import figure, micro_name
+from addvc.report.page_tables import figure, micro_name, network_name
 
 STRETCHED = 0.003  # strain by which a specimen may seem longer, and less compressed than before
 STUBS = {
@@ -132,7 +132,8 @@ def state_warnings(state: dict, summary: dict) -> list[str]:
             "have a residual far above the noise of the images."
         )
     found += fold_warnings(state, summary) + torn_warnings(state, micro)
-    found += equilibrium_warnings(state) + residual_warnings(state, micro)
+    found += equilibrium_warnings(state) + unlike_warnings(state, network_name(summary))
+    found += residual_warnings(state, micro)
     found += noise_warnings(state, micro)
     others = (name for name in summary["results"] if name != micro)
     return found + [line for name in others for line in loop_warnings(state, name)]
@@ -204,6 +205,19 @@ def flag_warnings(state: dict) -> list[str]:
         f"- State {state['state']}: {struts['flagged']} of {count} struts (at most 10 %) are "
         "flagged: broken by the threshold, not measured, far from equilibrium or on nodes in doubt. "
         "What is said of bending leaves them out; the scene shows where they are."
+    ]
+
+
+def unlike_warnings(state: dict, network: str | None) -> list[str]:
+    """One line where struts are measured in equilibrium, which the network fit found no help."""
+    weight = (state.get("equilibrium") or {}).get("weight")
+    if weight is None or network is None or not state[network]["refused"]:
+        return []
+    return [
+        f"- State {state['state']}: struts are measured in equilibrium, but the images do not show "
+        f"that {network.split('-')[0]} comes nearer by it ({network} is a copy): where struts hinge, "
+        "touch or are moved from outside it takes motion for noise. Compare the columns `_raw` of the "
+        "struts, and if they tell another story say `struts: {equilibrium: false}`."
     ]
 
 

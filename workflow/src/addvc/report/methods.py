@@ -118,10 +118,10 @@ def meso(summary: dict, config: dict) -> str:
 def equilibrium_fit(summary: dict) -> str:
     """The network fit, where it was made."""
     name = network_name(summary)
-    if name is None or not any(state[name]["weight"] for state in summary["states"]):
+    if name is None or not summary["states"]:
         return ""
     without = [state["label"] for state in summary["states"] if not state[name]["weight"]]
-    told = f"{name}; not in {', '.join(without)}" if without else name
+    told = f"{name}; refused in {', '.join(without)}" if without else name
     return (
         " What the finest of these meshes had found was also fitted, robustly {robust}, by motions of "
         "the frame of struts that the reference shows, which hardly need loads between their ends, at "

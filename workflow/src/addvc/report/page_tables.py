@@ -38,22 +38,22 @@ RESIDUAL_WORDS = (
 )
 
 
-def network_words(summary: dict) -> str:
-    """What the result of the network fit is, and why it is that of its mesh in some states; nothing
-    where it was not asked for."""
+def network_words(summary: dict) -> list[str]:
+    """Lines: what the result of the network fit is, and why it is a copy of that of its mesh in some
+    states; none where it was not asked for."""
     name = network_name(summary)
     if name is None or not summary["states"]:
-        return ""
-    words = [
-        f" {name}: {name.split('-')[0]} near equilibrium of the frame of struts, by as much as the "
+        return []
+    words = (
+        f"{name}: {name.split('-')[0]} near equilibrium of the frame of struts, by as much as the "
         "images say that it helps; with less noise in it, it may leave more of the residual."
-    ]
-    words += [
-        f"In {state['label']} both are the same: {state[name]['refused']}."
+    )
+    same = [
+        f"- {state['label']}: a copy, since {state[name]['refused']}."
         for state in summary["states"]
         if state[name]["refused"]
     ]
-    return " ".join(words)
+    return ["", words, "", *same]
 
 
 def results_table(summary: dict) -> list[str]:
@@ -114,7 +114,7 @@ def convergence_words(summary: dict) -> str:
 def cutoff(result: dict) -> str:
     """l_E of a micro result of the default kind, l_L of a meso one, w of a network fit."""
     if result["refused"]:
-        return "as its mesh"
+        return "a copy"
     if result["weight"]:
         return f"w = {result['weight']:.1e}"
     length = result["l_e"] or result["l_l"]
