@@ -103,9 +103,7 @@ def convergence_words(summary: dict) -> str:
     """What the lengths of the table are not."""
     words = "The coarsest mesh has no regularisation"
     if network_name(summary):
-        words += (
-            f"; w is the weight of equilibrium in the network fit, which ends at {SETTLED:g} voxel"
-        )
+        words += f"; w is the weight of equilibrium, whose fit ends at steps of {SETTLED:g} voxel"
     if "eq10" in summary["methods"].values():
         words += "; the lengths of eq10, which every state shares, are in Table 2"
     return words + "."
