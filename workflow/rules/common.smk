@@ -83,12 +83,8 @@ NETWORK = settings.network_names(config)
 RESULTS = [*MESO, *NETWORK, *MICRO]  # all that is measured on, coarse to fine
 EARLIER = ["previous", "extrapolated", "composed"]  # starts that need the state before
 FREEFORM = ["freeform"] if "freeform" in config["meso"]["candidates"] else []
-JUDGED = [
-    *MESO,
-    *NETWORK,
-    *FREEFORM,
-    *MICRO,
-]  # all that a truth, where known, is compared with
+# All that a truth, where known, is compared with.
+JUDGED = [*MESO, *NETWORK, *FREEFORM, *MICRO]
 TRUTH = settings.truth_file(config) if KIND == "scans" else None
 if KIND == "virtual":
     TRUTH = f"{R}/truth/virtual.json"
@@ -222,8 +218,8 @@ def starts_on_micro(wildcards):
 
 
 def mesh_of(name):
-    """The mesh of a result: every micro method shares one, and the network fit has that of its meso DVC."""
-    return f"{R}/geometry/{name.split('-')[0]}.vtu"
+    """The file of the mesh of a result."""
+    return f"{R}/geometry/{settings.mesh_name(name)}.vtu"
 
 
 def method_of(wildcards):

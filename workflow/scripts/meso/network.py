@@ -1,7 +1,5 @@
 """What the finest meso mesh has found, near equilibrium of the frame of struts."""
 
-from dataclasses import replace
-
 from addvc.runtime import job
 from addvc.correlation.meso import meso_options, meso_system
 from addvc.correlation.micro import robust_scale
@@ -21,8 +19,8 @@ with job(snakemake):
     mesh, levels = read_mesh(source.mesh), read_json(source.threshold)
     solution, found = load_solution(source.solution)
     size = read_json(source.figures)["mean_edge"]
-    options = meso_options(params.meso, size, params.axis, False, degree)
-    system = meso_system(mesh, reference, replace(options, cutoff=found["l_l"]))
+    chosen = params.meso | {"l_l": found["l_l"]}
+    system = meso_system(mesh, reference, meso_options(chosen, size, params.axis, False, degree))
     noise, scale = Noise(levels["noise"], params.blur), robust_scale(params.micro["robust"], levels)
     frame, micro = load_frame(source.frame), read_mesh(source.micro)
     data = risk_data(micro, len(frame.frame.points), images, system, scale, noise)

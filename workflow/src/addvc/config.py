@@ -176,6 +176,11 @@ def network_names(config: dict) -> list[str]:
     return [meso_names(config)[-1] + NETWORK] if wanted else []
 
 
+def mesh_name(result: str) -> str:
+    """The mesh of a result: every micro method shares one, and a network fit has that of meso DVC."""
+    return result.split("-")[0]
+
+
 def meso_size(config: dict, name: str, cell_size: float) -> float:
     """Mean edge of a meso mesh in voxels: as given, or the paper's times cell size / 28."""
     size = float(name.removeprefix("meso"))

@@ -54,6 +54,15 @@ def robust_square(r: np.ndarray, scale: float | None) -> np.ndarray:
     return square if scale is None else square / (1 + square / scale**2)
 
 
+def seen_square(
+    reference: Reference, r: np.ndarray, inside: np.ndarray, scale: float | None
+) -> np.ndarray:
+    """rho(r) (Q,) where the residual is known, inside (Q,); elsewhere what a point on a wrong strut
+    costs, so that nothing is gained by leaving the image."""
+    worst = scale**2 if scale is not None else np.ptp(reference.grey) ** 2
+    return np.where(inside, robust_square(r, scale), worst)
+
+
 def residual(
     reference: Reference, deformed: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

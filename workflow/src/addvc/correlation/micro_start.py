@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from addvc.correlation.metric import Reference, residual, residual_statistics, robust_square
+from addvc.correlation.metric import Reference, residual, residual_statistics, seen_square
 from addvc.correlation.micro import MicroOptions
 from addvc.correlation.regularisation import shear_wave, tikhonov_weight
 from addvc.errors import CorrelationError
@@ -61,9 +61,7 @@ def judged(judge: Judge, deformed: np.ndarray, u: np.ndarray) -> dict:
     reference, mesh = judge.reference, judge.reference.mesh
     w = reference.quadrature.weight
     r, inside = residual(reference, deformed, u)
-    square = robust_square(r, judge.scale)
-    worst = judge.scale**2 if judge.scale is not None else np.ptp(reference.grey) ** 2
-    fit = float(w @ np.where(inside, square, worst)) / w.sum()
+    fit = float(w @ seen_square(reference, r, inside, judge.scale)) / w.sum()
     volume = physical_gradients(mesh)[1].sum()
     energy = elastic_energy(mesh, strain(mesh, u, finite=True), judge.nu)
     statistics = residual_statistics(r, inside, w)

@@ -20,7 +20,7 @@ from addvc.correlation.metric import (
     residual_at,
     residual_statistics,
     right_hand_side,
-    robust_square,
+    seen_square,
 )
 from addvc.correlation.register import System
 from addvc.correlation.uncertainty import SEED, Noise
@@ -51,9 +51,8 @@ class RiskData:
         """Mean of rho(r) under u (Q, 3), grey levels^2, and how much each point counts in it (Q,): one
         outside of I_d costs as much as one on a wrong strut, whatever the noise."""
         r, inside = residual_at(self.reference, self.deformed, u)
-        worst = self.scale**2 if self.scale is not None else np.ptp(self.reference.grey) ** 2
         trust = np.ones(len(r)) if self.scale is None else geman_mcclure(r, self.scale)
-        return self.mean(np.where(inside, robust_square(r, self.scale), worst)), inside * trust
+        return self.mean(seen_square(self.reference, r, inside, self.scale)), inside * trust
 
     def mean(self, values: np.ndarray) -> float:
         """Of values (..., Q), weighted."""

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 
 from addvc.analysis.validity import verdict
+from addvc.config import mesh_name
 from addvc.correlation.gauss_newton import Solution
 from addvc.correlation.store import load_notes, load_solution
 from addvc.fem.io import read_mesh, read_vtu
@@ -108,10 +109,10 @@ class Case:
         return load_volume(self.path(image_name(state, smooth)))[0]
 
     def mesh(self, name: str) -> Mesh:
-        return read_mesh(self.path(f"geometry/{name.split('-')[0]}.vtu"))
+        return read_mesh(self.path(f"geometry/{mesh_name(name)}.vtu"))
 
     def mesh_facts(self, name: str) -> dict:
-        return self.json(f"geometry/{name.split('-')[0]}.json")
+        return self.json(f"geometry/{mesh_name(name)}.json")
 
     def penalised(self) -> np.ndarray:
         """0 free or bulk, 1 ends, 2 sides for each node (n,) of the micro mesh (Fig. 9)."""

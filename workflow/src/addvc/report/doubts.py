@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from addvc.analysis.balance import refusal
-from addvc.config import METHODS
+from addvc.config import METHODS, mesh_name
 from addvc.errors import grey_words
 from addvc.report.case import FOLDED
 from addvc.report.page_tables import figure, micro_name, network_name
@@ -145,7 +145,7 @@ def loop_warnings(state: dict, mesh: str) -> list[str]:
     if one["converged"] or one["refused"]:
         return []
     remedy = (
-        f"It starts from {mesh.split('-')[0]}, which may be far off (Fig. 10); nothing else uses it."
+        f"It starts from {mesh_name(mesh)}, which may be far off (Fig. 10); nothing else uses it."
         if one["weight"]
         else "Look at the residual maps (Fig. 13); a longer regularisation length or a better start "
         "may help."
@@ -215,7 +215,7 @@ def unlike_warnings(state: dict, network: str | None) -> list[str]:
         return []
     return [
         f"- State {state['state']}: struts are measured in equilibrium, but the images do not show "
-        f"that {network.split('-')[0]} comes nearer by it ({network} is a copy): where struts hinge, "
+        f"that {mesh_name(network)} comes nearer by it ({network} is a copy): where struts hinge, "
         "touch or are moved from outside it takes motion for noise. Compare the columns `_raw` of the "
         "struts, and if they tell another story say `struts: {equilibrium: false}`."
     ]

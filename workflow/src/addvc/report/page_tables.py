@@ -1,6 +1,6 @@
 """Tables of the first page of the report, in reStructuredText."""
 
-from addvc.config import NETWORK
+from addvc.config import NETWORK, mesh_name
 from addvc.correlation.frame_fit import SETTLED
 from addvc.errors import grey_words
 
@@ -45,7 +45,7 @@ def network_words(summary: dict) -> list[str]:
     if name is None or not summary["states"]:
         return []
     words = (
-        f"{name}: {name.split('-')[0]} near equilibrium of the frame of struts, by as much as the "
+        f"{name}: {mesh_name(name)} near equilibrium of the frame of struts, by as much as the "
         "images say that it helps; with less noise in it, it may leave more of the residual."
     )
     same = [
@@ -96,7 +96,7 @@ def start(state: dict, mesh: str) -> str:
     """What a result starts from: the network fit from that of its mesh."""
     if mesh.startswith("micro"):
         return state["micro_start"]
-    return state[mesh]["start"] or mesh.split("-")[0]
+    return state[mesh]["start"] or mesh_name(mesh)
 
 
 def convergence_words(summary: dict) -> str:
