@@ -17,6 +17,7 @@ from addvc.fem.mesh import boundary_faces, outer_faces
 from addvc.images.files import write_json
 from addvc.images.scans_store import save_volume
 from addvc.report import (
+    anatomy,
     captions,
     curves,
     judging,
@@ -97,6 +98,27 @@ def test_a_title_tells_of_elements_turned_inside_out(case, folder, cube):
     mirror = Solution(cube.points * [-2, 0, 0], [0.1], True, residual={})
     save_solution(folder / "dvc/meso9_state1.h5", mirror, cube)
     assert case.title(1, "meso9") == "3.4 %: converged, 100.0 % inverted"
+
+
+def test_a_state_without_any_solid_has_a_panel_that_says_so(case, cube, tmp_path, monkeypatch):
+    """A failed state is a result, not an error."""
+    whole = cube.points, boundary_faces(cube)
+    nothing = np.zeros((0, 3)), np.zeros((0, 3), int)
+    monkeypatch.setattr(anatomy, "_foam", lambda _, state: nothing if state == 2 else whole)
+    said, picture = [], tmp_path / "states.png"
+    monkeypatch.setattr(style, "note", lambda ax, text, *given, **options: said.append(text))
+    anatomy.states(case, [picture])
+    assert "no solid is seen" in said and picture.stat().st_size > 0
+
+
+def test_several_lengths_may_have_the_least_risk(case, folder, cube, tmp_path):
+    """As where a state is the reference itself."""
+    risk = [{"l_e": length, "risk": 0.0} for length in (10.0, 15.0, 22.5)]
+    for state in (1, 2):
+        still = Solution(0 * cube.points, [0.0], True, residual={"std": 0.0})
+        save_solution(folder / f"dvc/micro_state{state}.h5", still, cube, risk=risk)
+    curves.cutoff(case, [tmp_path / "cutoff.svg"])
+    assert (tmp_path / "cutoff.svg").stat().st_size > 0
 
 
 def test_a_result_looks_alike_in_all_figures():

@@ -35,7 +35,11 @@ def states(case: Case, outputs: Iterable[str]) -> None:
     fit = fit[in_box(fit, *np.percentile(fit, (0.2, 99.8), axis=0))]  # specks of noise left out
     fig, axes = style.panels(1, len(numbers), aspect(view, fit))
     for panel, (ax, state, foam) in enumerate(zip(axes[0], numbers, foams, strict=True)):
-        render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
+        if len(foam[0]):
+            render([Layer(*foam)], view, 170 / len(numbers), fit, shadows=True).show(ax)
+        else:
+            ax.axis("off")
+            style.note(ax, "no solid is seen", y=0.5)
         style.headline(ax, case.labels[state] if state else "reference", panel)
     style.scale_bar(axes[0, 0], case.voxel_um, 0.5)
     style.axis_arrows(axes[0, -1], view.right, view.up)

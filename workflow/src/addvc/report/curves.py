@@ -191,7 +191,8 @@ def cutoff(case: Case, outputs: Iterable[str]) -> None:
         tried, risk = np.array(sorted((row["l_e"], row["risk"]) for row in trials)).T
         risk = (risk - risk.min()) / (risk.min() or 1.0)
         ax.plot(tried, 100 * risk, "o-", color=colour, ms=4, label=case.title(state, case.micro[0]))
-        ax.plot(tried[risk == 0], 0, "o", mfc="none", mec=colour, ms=10)
+        least = risk == 0
+        ax.plot(tried[least], risk[least], "o", mfc="none", mec=colour, ms=10)
         lengths |= set(np.round(tried, 3))
     ax.set(xscale="log", xlabel=f"$l_E$ that was tried ({style.voxels(case.voxel_um)})")
     ax.set_ylabel("risk above its least (%)")
